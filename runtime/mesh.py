@@ -1,0 +1,151 @@
+"""The data every folder shares: Asset → Surface → Charts → Atlas.
+
+v welded vertices · n file vertices · f faces · k charts · p patches.  Positions are float64 in the units of the source file.
+uv is v up; corner_uv (f, 3, 2) gives the uv of each corner of each face, which needs no decision on what is one vertex.
+Face i is the same triangle in all four.  All arrays are read-only by convention: nothing here is mutated after it is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A welded triangle surface: what sampling, training, finishing and metrics work on.
+
+    vertices: (v, 3) float64, finite, each used by a face.
+    faces: (f, 3) int64, no degenerate and no duplicate face; consistently oriented where that is possible.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """(f, 3, 3) float64 corner positions."""
+        return self.vertices[self.faces]
+
+    def face_cross(self) -> NDArray[np.float64]:
+        """(f, 3) float64 edge cross products: direction = face normal, length = twice the area."""
+        corner = self.triangles
+        return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+
+    def face_areas(self) -> NDArray[np.float64]:
+        """(f,) float64 in source units squared."""
+        return 0.5 * np.linalg.norm(self.face_cross(), axis=1)
+
+    def face_normals(self) -> NDArray[np.float64]:
+        """(f, 3) float64 unit normals, right-handed (zero for a face of zero area)."""
+        cross = self.face_cross()
+        return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Centre and scale that bring a surface into the unit ball: xyz_ball = (xyz − centre) / scale."""
+
+    centre: tuple[float, float, float]
+    scale: float
+
+    @classmethod
+    def of(cls, vertices: NDArray[np.float64]) -> Frame:
+        """Frame of the bounding-box centre and the largest distance to it; vertices (v, 3)."""
+        centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+        scale = float(np.linalg.norm(vertices - centre, axis=1).max())
+        x, y, z = centre.tolist()
+        return cls(centre=(x, y, z), scale=scale if scale > 0.0 else 1.0)
+
+    def apply(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 3) source units → (…, 3) unit ball."""
+        return (xyz - np.asarray(self.centre)) / self.scale
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """One material of the source file, as far as baking needs it.
+
+    name: as in the file.  base_color_factor: linear RGBA in [0, 1].
+    base_color: (h, w, 4) uint8 sRGB, row 0 = top, or None.
+    """
+
+    name: str = "material"
+    base_color_factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    base_color: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Asset:
+    """A mesh file, cleaned: the file's own vertices (split as the file splits them) and the welded surface beneath.
+
+    positions: (n, 3) float64.  faces: (f, 3) int64 into positions, the file's faces in the file's order, minus those dropped.
+    weld: (n,) int64, the surface vertex of each file vertex.  surface: faces of it = weld[faces].
+    normals: (n, 3) unit float64 or None.  colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
+    face_material: (f,) int64 into materials.  changes: what cleaning did, name → count, only non-zero entries.
+    sha256: hex digest of the source file's bytes ("" when made in memory).  stem: base name for outputs.
+    """
+
+    positions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    weld: NDArray[np.int64]
+    surface: Surface
+    normals: NDArray[np.float64] | None = None
+    colors: NDArray[np.uint8] | None = None
+    uv: NDArray[np.float64] | None = None
+    materials: tuple[Material, ...] = ()
+    face_material: NDArray[np.int64] | None = None
+    changes: dict[str, int] = field(default_factory=dict)
+    sha256: str = ""
+    stem: str = "mesh"
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Finished charts, not packed: each flat in its own coordinates, in source units (uv area ≈ surface area).
+
+    face_chart: (f,) int64 in [0, k).  corner_uv: (f, 3, 2) float64; inside a chart two faces are joined along an edge
+    exactly when their corner uv are equal there.  face_patch: (f,) int64 in [0, p): the Unwrap-Net that answers for the face.
+    patch_chart: (p,) int64.  method: per chart "slim", "slit" or "xatlas": how it became valid.
+    """
+
+    face_chart: NDArray[np.int64]
+    corner_uv: NDArray[np.float64]
+    face_patch: NDArray[np.int64]
+    patch_chart: NDArray[np.int64]
+    method: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Charts packed into the unit square; vertices are split along seams, so it is what an engine loads.
+
+    positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float32 in [0, 1], v up.  normals: (n, 3) float32 unit.
+    face_chart: (f,) int64.  source_vertex: (n,) int64 into Asset.positions.
+    size: texels per side.  padding: texels kept free around each chart (so two charts are 2 × padding apart).
+    placement: (k, 2, 3) float64, chart coordinates → atlas uv (a similarity, same scale for all charts), or None
+    when the uv came from elsewhere.
+    """
+
+    positions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    face_chart: NDArray[np.int64]
+    source_vertex: NDArray[np.int64]
+    size: int
+    padding: int
+    placement: NDArray[np.float64] | None = None
+
+    @property
+    def corner_uv(self) -> NDArray[np.float64]:
+        """(f, 3, 2) float64: the uv as written (float32 values)."""
+        return self.uv[self.faces].astype(np.float64)
+
+
+Report = dict[str, Any]
