@@ -1,0 +1,1 @@
+"""Texture baking with OpenGL, image and glTF files."""

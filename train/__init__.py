@@ -1,0 +1,1 @@
+"""The networks of the paper, their training, and the finishing that makes valid charts of them."""
