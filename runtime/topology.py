@@ -1,7 +1,7 @@
 """Topology of triangle index arrays: edges, components, boundary loops, and cutting a mesh open along edges.
 
-f faces · e edges · v vertices.  Corner c = 3·face + i; half-edge h = 3·face + i runs from corner i to corner (i + 1) % 3.
-Everything here reads vertex indices only: positions play no part.  No Python loop runs over faces or edges.
+f faces · e edges · v vertices.  Corner 3·face + i; half-edge 3·face + i runs from corner i to corner (i + 1) % 3.
+Everything here reads vertex indices only: positions play no part.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def boundary_loops(faces: NDArray[np.int64]) -> list[NDArray[np.int64]]:
         faces: (f, 3) int64.
 
     Returns:
-        List of (n,) int64 vertex indices, in order, without repeating the first; longest loop first, then lowest vertex.
+        List of (n,) int64 vertex indices in order, the first not repeated; longest loop first, then lowest vertex.
     """
     cut_faces, old_vertex = split_non_manifold_vertices(faces)
     table = edge_table(cut_faces)

@@ -36,7 +36,7 @@ def grid(n: int) -> NDArray[np.int64]:
 
 
 def welded(path: Path) -> NDArray[np.int64]:
-    mesh = trimesh.load(path, process=False, force="mesh", skip_materials=True)
+    mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
     _, weld = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)
     return weld.reshape(-1)[np.asarray(mesh.faces, dtype=np.int64)]
 
