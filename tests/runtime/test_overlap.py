@@ -69,7 +69,7 @@ def test_signs_equal_rational_arithmetic_where_float64_is_wrong() -> None:
     along = rng.random((3000, 1, 2)) + rng.random((3000, 3, 1)) * rng.random((3000, 1, 2))
     lattice = 0.1 * rng.integers(0, 4, (3000, 3, 2)) + 0.5
     tiny = np.ldexp(rng.integers(-3, 4, (3000, 3, 2)).astype(np.float64), rng.integers(-1070, -500, (3000, 3, 2)))
-    triangles: NDArray[np.float64] = np.concatenate([along, lattice, tiny])
+    triangles = np.concatenate([along, lattice, tiny]).astype(np.float64)
     exact = [exact_sign(triangle) for triangle in triangles]
     assert orientation_sign(triangles[:, 0], triangles[:, 1], triangles[:, 2]).tolist() == exact
     assert np.sign(signed_areas(triangles)).tolist() != exact

@@ -1,0 +1,75 @@
+"""The smallest gap between two charts of a uv layout.
+
+s segments of chart outlines, n points sampled on them.  The closest two points of different colour in a point set are
+joined by an edge of its Delaunay triangulation (the circle on them as diameter is empty), so one triangulation of
+points sampled on all outlines finds the gap, however many charts there are; the segments there make it exact.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_MOST_SAMPLES = 400_000
+
+
+def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], *, spacing: float) -> float | None:
+    """Smallest distance between outlines of different charts; they may touch, but not cross.
+
+    Args:
+        segments: (s, 2, 2) float64 uv ends of the outline segments.
+        chart: (s,) int64 chart of each.
+        spacing: distance of the samples, uv units; the result is at most that too large, and mostly exact.  Grows
+            where it would take more than 400,000 samples.
+
+    Returns:
+        The gap in uv units; None where there is one chart only, or all outlines lie on one line.
+    """
+    extent = np.ptp(segments.reshape(-1, 2), axis=0)
+    if len(np.unique(chart)) < 2 or extent.min() <= 1e-9 * extent.max():
+        return None
+    points, owner = _samples(segments, spacing)
+    order = np.lexsort((chart[owner], points[:, 1], points[:, 0]))
+    points, owner = points[order], owner[order]
+    same = (points[1:] == points[:-1]).all(axis=1)
+    if np.any(chart[owner[1:]][same] != chart[owner[:-1]][same]):
+        return 0.0
+    distinct = np.append(True, ~same)
+    points, owner = points[distinct], owner[distinct]
+    simplices = Delaunay(points).simplices.astype(np.int64)
+    a, b = np.concatenate([simplices[:, [0, 1]], simplices[:, [1, 2]], simplices[:, [2, 0]]]).T
+    across = chart[owner[a]] != chart[owner[b]]
+    a, b = a[across], b[across]
+    distance = np.linalg.norm(points[a] - points[b], axis=1)
+    near = distance <= distance.min() + 2.0 * spacing
+    return float(segment_distance(segments[owner[a[near]]], segments[owner[b[near]]]).min())
+
+
+def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) distances of segments first and second, both (n, 2, 2), that don't cross each other."""
+    pairs = [(first[:, 0], second), (first[:, 1], second), (second[:, 0], first), (second[:, 1], first)]
+    return np.min([_point_distance(point, segment) for point, segment in pairs], axis=0)
+
+
+def _point_distance(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) distances of points (n, 2) from segments (n, 2, 2)."""
+    along, offset = segment[:, 1] - segment[:, 0], point - segment[:, 0]
+    length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    share = np.clip((along * offset).sum(axis=1) / length, 0.0, 1.0)
+    return np.linalg.norm(offset - share[:, None] * along, axis=1)
+
+
+def _samples(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points (n, 2) on the segments (s, 2, 2), ends included, at most spacing apart, and the segment (n,) of each."""
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    spacing = max(spacing, float(length.sum()) / _MOST_SAMPLES)
+    steps = np.maximum(np.ceil(length / spacing).astype(np.int64), 1)
+    owner = np.repeat(np.arange(len(segments)), steps + 1)
+    index = np.arange(len(owner)) - np.repeat(np.cumsum(steps + 1) - (steps + 1), steps + 1)
+    share = (index / steps[owner])[:, None]
+    return segments[owner, 0] * (1.0 - share) + segments[owner, 1] * share, owner
