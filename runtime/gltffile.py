@@ -1,0 +1,308 @@
+"""glTF 2.0 (.glb, .gltf) → RawMesh: the triangles of the default scene, node transforms applied, in scene order.
+
+Words of the specification (Khronos, glTF 2.0.1): accessor, bufferView, primitive, node.  uv is turned v up; linear
+COLOR_0 becomes sRGB.  Read here and not with trimesh, which drops uv without a material, ignores `normalized` and
+trusts any count.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+
+from .errors import MeshError
+from .materials import decode_image, linear_to_srgb
+from .mesh import Material
+from .rawmesh import MAX_FACES, RawMesh, merge, transformed
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+GLB_MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+UNREADABLE = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+TRANSFORM = "KHR_texture_transform"
+
+
+@dataclass(frozen=True, eq=False)
+class _File:
+    """The JSON tree, its buffers' bytes, and the folder its references may reach."""
+
+    tree: dict[str, Any]
+    buffers: list[bytes]
+    folder: Path
+
+
+def read_gltf(data: bytes, folder: Path) -> RawMesh:
+    """Read a .glb or .gltf file.
+
+    Args:
+        data: the bytes of the file.
+        folder: where it lies; references outside of it, and URLs, are refused.
+
+    Raises:
+        MeshError: damaged, compressed in a way that is not read, without triangles, or with such a reference.
+    """
+    try:
+        tree, binary = _tree(data)
+        file = _File(tree, _buffers(tree, binary, folder), folder)
+        return _scene(file)
+    except MeshError:
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error, RecursionError) as error:
+        raise MeshError(
+            f"the glTF file is damaged ({type(error).__name__}: {error}), expected glTF 2.0; export it again"
+        ) from error
+
+
+def _tree(data: bytes) -> tuple[dict[str, Any], bytes | None]:
+    if data[:4] != b"glTF":
+        tree, binary = json.loads(data.decode("utf-8-sig")), None
+    else:
+        chunks: dict[int, bytes] = {}
+        start, end = 12, min(len(data), struct.unpack_from("<I", data, 8)[0])
+        while start + 8 <= end:
+            length, kind = struct.unpack_from("<II", data, start)
+            if start + 8 + length > len(data):
+                raise MeshError("the GLB file is cut short, expected the length in its header; copy or export it again")
+            chunks.setdefault(kind, data[start + 8 : start + 8 + length])
+            start += 8 + length
+        tree, binary = json.loads(chunks[JSON_CHUNK].decode("utf-8")), chunks.get(BINARY_CHUNK)
+    version = str(tree["asset"]["version"])
+    if not version.startswith("2."):
+        raise MeshError(f"glTF version {version[:20]}, expected 2.x; convert the file")
+    compressed = [name for name in UNREADABLE if name in tree.get("extensionsRequired", [])]
+    if compressed:
+        raise MeshError(
+            f"the glTF file is compressed ({compressed[0]}), which is not read; export it without compression"
+        )
+    return tree, binary
+
+
+def _buffers(tree: dict[str, Any], binary: bytes | None, folder: Path) -> list[bytes]:
+    result = []
+    for buffer in tree.get("buffers", []):
+        if "uri" in buffer:
+            result.append(_resource(buffer["uri"], folder))
+        elif binary is not None:
+            result.append(binary)
+        else:
+            raise MeshError("a glTF buffer has neither data nor uri; export the file again")
+    return result
+
+
+def _resource(uri: str, folder: Path) -> bytes:
+    """Bytes of a data URI, or of a file inside the folder."""
+    if uri.startswith("data:"):
+        head, _, body = uri.partition(",")
+        try:
+            return base64.b64decode(body) if head.endswith(";base64") else unquote(body).encode("latin-1")
+        except (binascii.Error, UnicodeEncodeError) as error:
+            raise MeshError(f"a data URI of the glTF file is damaged ({error}); export it again") from error
+    path = (folder / unquote(uri)).resolve()
+    if urlsplit(uri).scheme or not path.is_relative_to(folder.resolve()):
+        raise MeshError(
+            f"the glTF file refers to {uri[:120]!r}, expected files in its own folder; embed it (export as .glb)"
+        )
+    if not path.is_file():
+        raise MeshError(
+            f"the glTF file refers to {uri[:120]!r}, which does not lie beside it; copy it there or export as .glb"
+        )
+    return path.read_bytes()
+
+
+def _view(file: _File, index: int) -> tuple[memoryview, dict[str, Any]]:
+    view = file.tree["bufferViews"][index]
+    start = view.get("byteOffset", 0)
+    data = memoryview(file.buffers[view["buffer"]])[start : start + view["byteLength"]]
+    if start < 0 or len(data) != view["byteLength"]:
+        raise MeshError(f"glTF bufferView {index} ends behind its buffer; the file is damaged: export it again")
+    return data, view
+
+
+def _table(
+    data: memoryview, offset: int, stride: int, count: int, dtype: type[np.generic], columns: int
+) -> NDArray[Any]:
+    """(count, columns) from strided bytes; a view beyond the data raises ValueError or TypeError."""
+    layout = np.dtype(
+        {"names": ["row"], "formats": [(np.dtype(dtype).newbyteorder("<"), (columns,))], "itemsize": stride}
+    )
+    whole = count - 1
+    last = np.frombuffer(data, dtype=np.dtype(dtype).newbyteorder("<"), count=columns, offset=offset + whole * stride)
+    rows = np.frombuffer(data, dtype=layout, count=whole, offset=offset)["row"].reshape(whole, columns)
+    return np.concatenate([rows, last[None]])
+
+
+def _accessor(file: _File, index: int) -> NDArray[Any]:
+    """(count, columns): float64 where the component is float or normalized, else its integer type."""
+    accessor = file.tree["accessors"][index]
+    dtype, columns, count = COMPONENTS[accessor["componentType"]], COLUMNS[accessor["type"]], accessor["count"]
+    if not 0 < count <= 3 * MAX_FACES:
+        raise MeshError(
+            f"glTF accessor {index} holds {count} elements, expected 1 to {3 * MAX_FACES}; export the file again"
+        )
+    width = np.dtype(dtype).itemsize * columns
+    if "bufferView" in accessor:
+        data, view = _view(file, accessor["bufferView"])
+        values = _table(data, accessor.get("byteOffset", 0), view.get("byteStride", width), count, dtype, columns)
+    else:
+        values = np.zeros((count, columns), dtype=dtype)
+    if "sparse" in accessor:
+        sparse = accessor["sparse"]
+        where, what = sparse["indices"], sparse["values"]
+        kind = COMPONENTS[where["componentType"]]
+        places, _ = _view(file, where["bufferView"])
+        entries, _ = _view(file, what["bufferView"])
+        place = _table(places, where.get("byteOffset", 0), np.dtype(kind).itemsize, sparse["count"], kind, 1)[:, 0]
+        values[place] = _table(entries, what.get("byteOffset", 0), width, sparse["count"], dtype, columns)
+    if accessor.get("normalized") and values.dtype.kind in "iu":
+        return np.maximum(values / np.iinfo(dtype).max, -1.0)
+    return values.astype(np.float64) if values.dtype.kind == "f" else values
+
+
+def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    """(4, 4) float64, column vectors: T · R · S, or the matrix given (stored by columns)."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = (float(value) for value in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.asarray(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def _placed_meshes(tree: dict[str, Any]) -> list[tuple[int, NDArray[np.float64]]]:
+    """(mesh, node → world matrix) of each node that has a mesh, depth first in the order of the scene."""
+    nodes = tree.get("nodes", [])
+    children = {child for node in nodes for child in node.get("children", [])}
+    scenes = tree.get("scenes", [])
+    roots = (
+        scenes[tree.get("scene", 0)].get("nodes", []) if scenes else [i for i in range(len(nodes)) if i not in children]
+    )
+    waiting, seen, placed = [(root, np.eye(4)) for root in reversed(roots)], set(), []
+    while waiting:
+        index, parent = waiting.pop()
+        if index in seen:
+            raise MeshError(
+                f"glTF node {index} has several parents or is its own ancestor, expected a tree; export again"
+            )
+        seen.add(index)
+        world = parent @ _local_matrix(nodes[index])
+        if "mesh" in nodes[index]:
+            placed.append((nodes[index]["mesh"], world))
+        waiting += [(child, world) for child in reversed(nodes[index].get("children", []))]
+    return placed
+
+
+def _scene(file: _File) -> RawMesh:
+    materials, changes = _materials(file)
+    parts, skipped, faces = [], 0, 0
+    for mesh, world in _placed_meshes(file.tree):
+        for primitive in file.tree["meshes"][mesh]["primitives"]:
+            if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
+                skipped += 1
+                continue
+            parts.append(transformed(_primitive(file, primitive, materials), world))
+            faces += len(parts[-1].faces)
+            if faces > MAX_FACES:
+                raise MeshError(f"the glTF scene has over {MAX_FACES} faces; decimate the meshes or split the scene")
+    if not parts:
+        found = "points or lines only (point clouds come in a later version)" if skipped else "no mesh"
+        raise MeshError(f"the glTF scene holds {found}, expected triangles; check the export")
+    whole = merge(parts)
+    whole.changes.update(changes, skipped_primitives=skipped)
+    return whole
+
+
+def _primitive(file: _File, primitive: dict[str, Any], materials: list[Material]) -> RawMesh:
+    attributes = primitive["attributes"]
+    positions = _accessor(file, attributes["POSITION"]).astype(np.float64)
+    indices = _accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(positions))
+    faces = _triangles(indices.astype(np.int64), primitive.get("mode", TRIANGLES))
+    normals = _accessor(file, attributes["NORMAL"]).astype(np.float64) if "NORMAL" in attributes else None
+    index = primitive.get("material")
+    name = f"TEXCOORD_{_base_texture(file.tree, index).get('texCoord', 0)}"
+    uv = _accessor(file, attributes[name]).astype(np.float64) if name in attributes else None
+    colors = _srgb(_accessor(file, attributes["COLOR_0"])) if "COLOR_0" in attributes else None
+    if any(values is not None and len(values) != len(positions) for values in (normals, uv, colors)):
+        raise MeshError("a glTF primitive has attributes of different lengths; export the file again")
+    return RawMesh(
+        positions=positions,
+        faces=faces,
+        normals=normals,
+        colors=colors,
+        uv=None if uv is None else uv * (1.0, -1.0) + (0.0, 1.0),
+        materials=() if index is None else (materials[index],),
+        face_material=None if index is None else np.zeros(len(faces), dtype=np.int64),
+    )
+
+
+def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """(f, 3) int64: triples, a strip (every second one turned, so that all wind alike) or a fan."""
+    if mode == TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    count = max(len(indices) - 2, 0)
+    i = np.arange(count)
+    if mode == STRIP:
+        return indices[np.stack([i, i + 1 + i % 2, i + 2 - i % 2], axis=1)]
+    return indices[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
+
+
+def _srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
+    """COLOR_0 (n, 3 or 4), linear, float or normalized → (n, 4) uint8 sRGB with linear alpha."""
+    scale = 1.0 if linear.dtype.kind == "f" else float(np.iinfo(linear.dtype).max)
+    rgba = np.ones((len(linear), 4))
+    rgba[:, : linear.shape[1]] = np.clip(np.nan_to_num(linear / scale), 0.0, 1.0)
+    rgba[:, :3] = linear_to_srgb(rgba[:, :3])
+    return np.rint(rgba * 255.0).astype(np.uint8)
+
+
+def _base_texture(tree: dict[str, Any], material: int | None) -> dict[str, Any]:
+    if material is None:
+        return {}
+    return tree["materials"][material].get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
+
+
+def _materials(file: _File) -> tuple[list[Material], dict[str, int]]:
+    """Base colours; counts textures that can't be had and texture transforms that are ignored."""
+    result, changes = [], {"missing_textures": 0, "ignored_texture_transforms": 0}
+    pictures: dict[int, NDArray[np.uint8]] = {}
+    for index, material in enumerate(file.tree.get("materials", [])):
+        texture, picture = _base_texture(file.tree, index), None
+        if "index" in texture:
+            entry = file.tree["textures"][texture["index"]]
+            source = entry.get("source", entry.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+            if source is None:
+                changes["missing_textures"] += 1
+            else:
+                picture = pictures[source] = pictures[source] if source in pictures else _picture(file, source)
+            changes["ignored_texture_transforms"] += TRANSFORM in texture.get("extensions", {})
+        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        red, green, blue, alpha = (min(max(float(value), 0.0), 1.0) for value in factor)
+        name = str(material.get("name", f"material_{index}"))
+        result.append(Material(name=name, base_color_factor=(red, green, blue, alpha), base_color=picture))
+    return result, changes
+
+
+def _picture(file: _File, index: int) -> NDArray[np.uint8]:
+    image = file.tree["images"][index]
+    data = bytes(_view(file, image["bufferView"])[0]) if "bufferView" in image else _resource(image["uri"], file.folder)
+    return decode_image(data)
