@@ -1,0 +1,87 @@
+"""What a user may ask of an unwrap, and what is written.  Checked when made; sizes and paddings are in texels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .mesh import Asset
+
+SIZES = (16, 16384)
+PRESETS = ("fast",)
+FORMATS = ("glb", "obj", "ply")
+LARGEST_SEED = 2**32 - 1
+AUTO = "auto"
+
+
+@dataclass(frozen=True)
+class Options:
+    """What decides an unwrap, together with the surface.
+
+    charts: K ≥ 1, the most charts a connected surface may get.  size: atlas side, 16 to 16384 texels.
+    padding: texels kept free around each chart, 0 to size / 8; None is size / 256, at least 2.
+    seed: 0 to 2³² − 1.  preset: "fast".
+
+    Raises: InputError for a value outside these.
+    """
+
+    charts: int = 8
+    size: int = 2048
+    padding: int | None = None
+    seed: int = 0
+    preset: str = "fast"
+
+    def __post_init__(self) -> None:
+        (low, high), most, presets = SIZES, self.size // 8, ", ".join(PRESETS)
+        _demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
+        _demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
+        _demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
+        _demand(0 <= self.seed <= LARGEST_SEED, f"seed is {self.seed}, expected 0 to {LARGEST_SEED}; pass --seed 0")
+        _demand(self.preset in PRESETS, f"preset is {self.preset!r}, expected one of {presets}; leave --preset out")
+
+    @property
+    def margin(self) -> int:
+        """The padding in force, in texels."""
+        return max(2, self.size // 256) if self.padding is None else self.padding
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What is written beside the ONNX file and the report.
+
+    maps: names of maps, or "auto": normal, position, and base-color where the source has colours, else uv-checker.
+    formats: of "glb", "obj", "ply", at least one.  preview: whether the preview picture is drawn.
+    texture_format: for all maps that can be stored so; None is each map's own.
+    normal_format: green channel of the normal map, "opengl" (+Y) or "directx" (−Y).
+
+    Raises: InputError for an unknown format.
+    """
+
+    maps: tuple[str, ...] = (AUTO,)
+    formats: tuple[str, ...] = ("glb",)
+    preview: bool = True
+    texture_format: Literal["png", "exr"] | None = None
+    normal_format: Literal["opengl", "directx"] = "opengl"
+
+    def __post_init__(self) -> None:
+        found, known = ", ".join(self.formats), ", ".join(FORMATS)
+        usable = len(self.formats) > 0 and set(self.formats) <= set(FORMATS)
+        _demand(usable, f"format is {found!r}, expected some of {known}; pass for instance --format glb")
+        kind, green = self.texture_format, self.normal_format
+        _demand(kind in (None, "png", "exr"), f"texture format is {kind!r}, expected png or exr; choose one of them")
+        _demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
+
+    def for_asset(self, asset: Asset) -> Outputs:
+        """The same with "auto" replaced by the maps it stands for, each map once."""
+        colored = asset.colors is not None or any(material.base_color is not None for material in asset.materials)
+        auto = ("normal", "position", "base-color" if colored else "uv-checker")
+        maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
+        return replace(self, maps=tuple(dict.fromkeys(maps)))
+
+
+def _demand(holds: bool, message: str) -> None:
+    if not holds:
+        raise InputError(message)
