@@ -1,0 +1,95 @@
+"""A small ONNX graph, collected node by node: the only module that touches the onnx package.
+
+Names depend on the order of the calls alone; no time, path or stack trace is stored: equal calls give equal bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..runtime.errors import FlexparaError, MissingDependencyError
+
+try:
+    from onnx import NodeProto, TensorProto, ValueInfoProto, checker, helper, numpy_helper, shape_inference
+except ImportError as error:
+    raise MissingDependencyError('onnx is missing, export needs it; pip install "flexpara[train]"') from error
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Ends = dict[str, tuple[str, list[str | int]]]
+"""Inputs or outputs: name → (dtype, shape), where a string is an axis of free length."""
+
+ELEMENT_TYPES = {"float32": TensorProto.FLOAT, "int64": TensorProto.INT64}
+
+
+@dataclass
+class GraphBuilder:
+    """Collects nodes and initializers; equal constants are stored once."""
+
+    nodes: list[NodeProto] = field(default_factory=list[NodeProto])
+    initializers: list[TensorProto] = field(default_factory=list[TensorProto])
+    _known: dict[tuple[str, tuple[int, ...], bytes], str] = field(default_factory=dict[Any, str])
+
+    def named(self, name: str, array: NDArray[Any]) -> str:
+        """Add an initializer under this very name."""
+        self.initializers.append(numpy_helper.from_array(np.asarray(array, order="C"), name))
+        return name
+
+    def constant(self, array: NDArray[Any]) -> str:
+        """Name of an initializer with this content."""
+        key = (array.dtype.str, array.shape, array.tobytes())
+        if key not in self._known:
+            self._known[key] = self.named(f"constant_{len(self._known)}", array)
+        return self._known[key]
+
+    def axes(self, *axes: int) -> str:
+        """Name of an int64 (len,) initializer, as Squeeze, Unsqueeze, Expand and ReduceSum take their axes or sizes."""
+        return self.constant(np.asarray(axes, dtype=np.int64))
+
+    def op(self, kind: str, *inputs: str, name: str | None = None, **attributes: Any) -> str:
+        """Append one node with one output; returns the output's name."""
+        output = name or f"{kind.lower()}_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(kind, list(inputs), [output], name=f"node_{output}", **attributes))
+        return output
+
+    def serialize(
+        self,
+        inputs: Ends,
+        outputs: Ends,
+        *,
+        opset: int,
+        ir_version: int,
+        producer: tuple[str, str],
+        metadata: dict[str, str],
+    ) -> bytes:
+        """The finished model, checked by onnx with full shape inference.
+
+        Args:
+            inputs: see Ends.
+            outputs: likewise.
+            opset: operator set of the default domain.
+            ir_version: ONNX IR version.
+            producer: name and version.
+            metadata: key → text, stored as metadata_props.
+
+        Raises:
+            FlexparaError: the nodes don't fit together.
+        """
+
+        def ends(side: Ends) -> list[ValueInfoProto]:
+            return [helper.make_tensor_value_info(name, ELEMENT_TYPES[t], shape) for name, (t, shape) in side.items()]
+
+        graph = helper.make_graph(self.nodes, "unwrap", ends(inputs), ends(outputs), self.initializers)
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=ir_version)
+        model.producer_name, model.producer_version = producer
+        helper.set_model_props(model, metadata)
+        try:
+            checker.check_model(model, full_check=True)
+        except (checker.ValidationError, shape_inference.InferenceError) as error:
+            reason = " ".join(str(error).split())
+            raise FlexparaError(f"the graph is not valid ONNX ({reason}), expected it to be; report it") from error
+        return model.SerializeToString(deterministic=True)

@@ -1,0 +1,132 @@
+"""The proof that an exported graph equals the torch model: both run on the same points, and every output is compared.
+
+n points · p patches · Δ difference.  uv in [0, 1]², score in [0, 1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import onnxruntime
+import torch
+from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidArgument, InvalidGraph, RuntimeException
+from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNotImplemented
+
+from ..runtime.errors import ParityError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..runtime.mesh import Atlas, Frame
+    from .graph import UnwrapGraph
+
+
+@dataclass(frozen=True)
+class ParitySpec:
+    """Where torch and onnxruntime are compared, and how closely they must agree."""
+
+    sizes: tuple[int, ...] = (1, 2, 1000)
+    """Numbers of points n; 1 finds a frozen axis, 2 a squeezed one."""
+    uv_atol: float = 2e-5
+    """Largest |Δuv|: 0.04 texels at 2048², a tenth of what the networks themselves miss the atlas by at most."""
+    score_atol: float = 1e-4
+    """Largest |Δscore|."""
+    tie: float = 1e-4
+    """Two logits closer than this × (1 + max |logit|) are a tie: either patch may win, and the point is left out."""
+    seed: int = 0
+    """Seed of the probe points."""
+
+
+@dataclass(frozen=True)
+class ParityReport:
+    """What the proof found.  compared: points (of all sizes together); ties: points left out; errors: max |Δ|."""
+
+    sizes: tuple[int, ...]
+    compared: int
+    ties: int
+    uv_error: float
+    score_error: float
+
+
+def probe_points(atlas: Atlas, frame: Frame, count: int, seed: int) -> NDArray[np.float32]:
+    """(count, 3) float32, source units: three of four on the surface, every fourth anywhere in the frame's ball."""
+    rng = np.random.default_rng(seed)
+    face = rng.integers(len(atlas.faces), size=count)
+    weight = rng.dirichlet(np.ones(3), size=count)
+    points = np.einsum("nc,ncx->nx", weight, atlas.positions[atlas.faces[face]])
+    direction = rng.normal(size=(count, 3))
+    radius = np.cbrt(rng.random((count, 1))) * frame.scale / np.linalg.norm(direction, axis=1, keepdims=True)
+    points[3::4] = (np.asarray(frame.centre) + direction * radius)[3::4]
+    return points.astype(np.float32)
+
+
+def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32], spec: ParitySpec) -> ParityReport:
+    """Compare the torch graph with the ONNX model ``content`` at the first n of ``points``, n in spec.sizes.
+
+    Raises:
+        ParityError: names the output, n, max |Δ| and what was allowed; or most points are ties and prove nothing.
+    """
+    session = _load(content)
+    compared = ties = 0
+    uv_error = score_error = 0.0
+    for n in spec.sizes:
+        sample = points[:n]
+        uv, chart, score = _run(session, sample)
+        with torch.no_grad():
+            logits, patch_uv = graph.logits_and_uv(torch.from_numpy(sample))
+            truth = [tensor.numpy() for tensor in graph.choose(logits, patch_uv)]
+        clear = ~_ties(logits.numpy(), spec.tie)
+        uv_error = max(uv_error, _difference("uv", uv, truth[0], clear, n, spec.uv_atol))
+        _difference("chart", chart, truth[1], clear, n, 0.0)
+        score_error = max(score_error, _difference("score", score, truth[2], clear, n, spec.score_atol))
+        compared, ties = compared + int(clear.sum()), ties + int((~clear).sum())
+    if ties > compared:
+        found = f"{ties} of {compared + ties} probe points are ties between patches"
+        raise ParityError(f"{found}, expected under half; train the networks")
+    return ParityReport(tuple(spec.sizes), compared, ties, uv_error, score_error)
+
+
+def _load(content: bytes) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except (Fail, InvalidGraph, OrtNotImplemented, RuntimeException) as error:
+        reason = str(error).splitlines()[0]
+        raise ParityError(f"onnxruntime can't load the graph ({reason}), expected a valid model; report it") from error
+
+
+def _run(session: onnxruntime.InferenceSession, points: NDArray[np.float32]) -> list[NDArray[np.generic]]:
+    """Outputs uv, chart, score."""
+    try:
+        found = session.run(["uv", "chart", "score"], {"points": points})
+    except (Fail, InvalidArgument, RuntimeException) as error:
+        reason = str(error).splitlines()[0]
+        message = f"onnxruntime can't run the graph at n = {len(points)} ({reason})"
+        raise ParityError(f"{message}, expected it to run; report this model, nothing was written") from error
+    return [np.asarray(output) for output in found]
+
+
+def _ties(logits: NDArray[np.float32], tie: float) -> NDArray[np.bool_]:
+    """(n,) True where the two largest logits of (n, p) are too close to say which patch wins."""
+    if logits.shape[1] == 1:
+        return np.zeros(len(logits), dtype=np.bool_)
+    ordered = np.sort(logits, axis=1)
+    return ordered[:, -1] - ordered[:, -2] <= tie * (1.0 + np.abs(logits).max(axis=1))
+
+
+def _difference(
+    name: str, found: NDArray[np.generic], truth: NDArray[np.generic], clear: NDArray[np.bool_], n: int, atol: float
+) -> float:
+    """Largest |Δ| over the points without a tie."""
+    remedy = "report this model, nothing was written"
+    if found.shape != truth.shape or found.dtype != truth.dtype:
+        shapes = f"{found.shape} {found.dtype} from onnxruntime, {truth.shape} {truth.dtype} from torch"
+        raise ParityError(f"{name} at n = {n}: {shapes}, expected the same; {remedy}")
+    delta = np.abs(found[clear].astype(np.float64) - truth[clear].astype(np.float64))
+    error = float(delta.max(initial=0.0))
+    if not error <= atol:
+        raise ParityError(f"{name} at n = {n}: max |Δ| = {error:.3g}, expected at most {atol:.3g}; {remedy}")
+    return error
