@@ -104,7 +104,7 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
 
 
 def _distinct_positions(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(m,) the atlas vertices that have each distinct position first, and (n,) which of them each atlas vertex shares."""
+    """(m,) the first atlas vertex of each distinct position, and (n,) which of them each atlas vertex shares."""
     order = np.argsort(atlas.source_vertex, kind="stable")
     _, first, inverse = np.unique(atlas.positions[order], axis=0, return_index=True, return_inverse=True)
     rank = np.zeros(len(first), dtype=np.int64)
