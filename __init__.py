@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     import trimesh
     from numpy.typing import ArrayLike
 
+    from . import bake as bake
+    from . import export as export
+    from . import runtime as runtime
+    from . import train as train
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.options import Options, Outputs
@@ -87,8 +91,9 @@ def load(mesh: MeshLike) -> Asset:
         return load_asset(Path(mesh))
     if isinstance(mesh, tuple):
         return asset_from_arrays(*mesh)
-    colors = mesh.visual.vertex_colors if mesh.visual.kind == "vertex" else None
-    return asset_from_arrays(mesh.vertices, mesh.faces, colors=colors, uv=getattr(mesh.visual, "uv", None))
+    visual: Any = mesh.visual
+    colors = visual.vertex_colors if visual.kind == "vertex" else None
+    return asset_from_arrays(mesh.vertices, mesh.faces, colors=colors, uv=getattr(visual, "uv", None))
 
 
 def unwrap_asset(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapResult:
@@ -198,7 +203,7 @@ class UnwrapResult:
 
             with clock.stage("preview"):
                 stretch = face_distortion(self.asset.surface, self.atlas.corner_uv)
-                output.write(f"{stem}.preview.png", lambda path: render_preview(self.asset, self.atlas, stretch, path))
+                output.write(f"{stem}.preview.png", lambda path: render_preview(self.atlas, stretch, path))
         seconds = {**self.report["seconds"], **{name: round(value, 3) for name, value in clock.seconds.items()}}
         output.write_report({**self.report, "seconds": seconds})
         return output.commit()
@@ -223,6 +228,16 @@ def check_outputs(output: OutputFolder, outputs: Outputs, size: int, *, meshes: 
         del baker
 
 
+def check_maps(names: Sequence[str]) -> None:
+    """Raises: InputError for an unknown map, MissingDependencyError when maps are wanted and can't be made."""
+    if names:
+        with requires("bake"):
+            from .bake.maps import find_map
+        for name in names:
+            if name != "auto":
+                find_map(name)
+
+
 def texture_files(stem: str, outputs: Outputs) -> dict[str, str]:
     """Map → file name.  Raises: InputError for an unknown map."""
     if not outputs.maps:
@@ -242,14 +257,14 @@ def write_textures(
         return {}
     from .bake import baker
 
-    steps, done = len(outputs.maps) + 1, iter(range(len(outputs.maps) + 1))
+    names = list(outputs.maps)
     textures = baker.bake(
         atlas,
         asset,
         outputs.maps,
         padding=padding,
         normal_format=outputs.normal_format,
-        progress=lambda name: progress(f"bake {name}", next(done), steps),
+        progress=lambda name: progress("bake", names.index(name), len(names)),
     )
     kind, first = outputs.texture_format, next(iter(texture_files(output.stem, outputs).values()))
     output.write(first, lambda path: baker.write_textures(textures, path.parent, output.stem, file_type=kind))

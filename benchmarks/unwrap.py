@@ -84,14 +84,14 @@ def peer_row(tool: str, asset: Asset, repeat: int, folder: Path) -> Row:
     """Unwrap by another tool, in processes of its own."""
     given, result = folder / "surface.npz", folder / "uv.npz"
     np.savez(given, vertices=asset.surface.vertices, faces=asset.surface.faces)
-    seconds, peaks = [], []
+    command = [sys.executable, "-m", "benchmarks.peers", tool, str(given), str(result)]
+    peaks, answers = list[float](), list[dict[str, np.ndarray]]()
     for _ in range(repeat):
-        _, peak = timed([sys.executable, "-m", "benchmarks.peers", tool, str(given), str(result)])
-        with np.load(result) as found:
-            corner_uv, call = found["corner_uv"], float(found["seconds"])
-        seconds.append(call)
-        peaks.append(peak)
-    return measured(asset, corner_uv) | {"seconds": statistics.median(seconds), "peak_mb": max(peaks)}
+        peaks.append(timed(command)[1])
+        with np.load(result, allow_pickle=False) as found:
+            answers.append(dict(found))
+    seconds = statistics.median(float(answer["seconds"]) for answer in answers)
+    return measured(asset, answers[-1]["corner_uv"]) | {"seconds": seconds, "peak_mb": max(peaks)}
 
 
 def flexpara_row(path: Path, asset: Asset, arguments: argparse.Namespace, folder: Path) -> Row:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
@@ -39,3 +40,31 @@ class Clock:
         self(name, 0, 1)
         yield
         self(name, 1, 1)
+
+
+@contextmanager
+def progress_bars(*, quiet: bool = False) -> Iterator[Progress | None]:
+    """Bars on stderr, one a stage, with loss and time left; None when quiet or when stderr is no terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich import progress
+    from rich.console import Console
+
+    columns = (
+        progress.TextColumn("{task.description:<10}"),
+        progress.BarColumn(),
+        progress.MofNCompleteColumn(),
+        progress.TimeElapsedColumn(),
+        progress.TimeRemainingColumn(),
+        progress.TextColumn("{task.fields[loss]}"),
+    )
+    with progress.Progress(*columns, console=Console(stderr=True)) as bars:
+        tasks: dict[str, progress.TaskID] = {}
+
+        def show(stage: str, step: int, steps: int, loss: float | None = None) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=steps, loss="")
+            bars.update(tasks[stage], completed=step, total=steps, loss="" if loss is None else f"loss {loss:.4g}")
+
+        yield show

@@ -1,0 +1,240 @@
+"""The command line, by calling main(): what it writes, and each bad input one by one."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import flexpara
+from flexpara import __main__ as cli
+from flexpara.__main__ import main
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+UV_SQUARE = """v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+f 1/1 2/2 3/3
+f 1/1 3/3 4/4
+"""
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    """A unit square that is its own uv."""
+    path = tmp_path / "square.obj"
+    path.write_text(UV_SQUARE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def fails(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that must end with a code and exactly one line on stderr; returns the line."""
+
+    def run(code: int, *argv: object) -> str:
+        capsys.readouterr()
+        assert main([str(word) for word in argv]) == code
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        assert printed.err.startswith("flexpara: error: ")
+        assert printed.err.count("\n") == 1
+        assert printed.err.endswith("\n")
+        return printed.err
+
+    return run
+
+
+def text_file(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_help_and_version_end_with_0(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert "unwrap" in capsys.readouterr().out
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == flexpara.__version__
+    assert main(["unwrap", "--help"]) == 0
+    assert "--charts" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        (["unwrp", "a.obj"], "unwrp"),
+        (["unwrap", "a.obj"], "--output"),
+        (["unwrap", "-o", "out"], "--mesh"),
+        (["unwrap", "a.obj", "-o", "out", "--charts", "many"], "many"),
+        (["unwrap", "a.obj", "-o", "out", "--bogus"], "--bogus"),
+        (["unwrap", "a.obj", "-o"], "-o"),
+    ],
+)
+def test_a_wrong_command_line_names_the_word_and_the_help(
+    argv: list[str], named: str, fails: Callable[..., str]
+) -> None:
+    line = fails(2, *argv)
+    assert named in line
+    assert "--help" in line
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "named"),
+    [
+        ("--charts", 0, "charts is 0"),
+        ("--charts", -3, "charts is -3"),
+        ("--size", 8, "size is 8"),
+        ("--size", 100_000, "size is 100000"),
+        ("--padding", -1, "padding is -1"),
+        ("--padding", 1000, "padding is 1000"),
+        ("--seed", -1, "seed is -1"),
+        ("--preset", "slow", "'slow'"),
+        ("--maps", "normal,shiny", "shiny"),
+        ("--format", "glb,fbx", "fbx"),
+        ("--format", "", "format"),
+    ],
+)
+def test_a_value_out_of_range_is_refused_before_the_mesh_is_read(
+    option: str, value: object, named: str, tmp_path: Path, fails: Callable[..., str]
+) -> None:
+    assert named in fails(2, "unwrap", tmp_path / "absent.obj", "-o", tmp_path / "out", option, value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "named"),
+    [
+        ("absent.obj", None, "absent.obj"),
+        ("notes.txt", "not a mesh", "notes.txt"),
+        ("broken.glb", "not a mesh", "broken.glb"),
+        ("empty.obj", "", "empty.obj"),
+        ("points.obj", TRIANGLE, "points.obj"),
+        ("nan.obj", TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", "nan.obj"),
+        ("inf.obj", TRIANGLE.replace("1 0 0", "inf 0 0") + "f 1 2 3\n", "inf.obj"),
+        ("flat.obj", TRIANGLE + "f 1 1 2\nf 2 2 3\n", "degenerate"),
+    ],
+)
+def test_a_bad_mesh_is_one_line_and_leaves_nothing(
+    name: str, text: str | None, named: str, tmp_path: Path, fails: Callable[..., str]
+) -> None:
+    if text is not None:
+        text_file(tmp_path, name, text)
+    assert named in fails(2, "unwrap", tmp_path / name, "-o", tmp_path / "out")
+    assert named in fails(2, "evaluate", tmp_path / name)
+    assert named in fails(2, "bake", tmp_path / name, "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_mesh_without_uv_can_be_neither_evaluated_nor_baked(tmp_path: Path, fails: Callable[..., str]) -> None:
+    mesh = text_file(tmp_path, "bare.obj", TRIANGLE + "f 1 2 3\n")
+    assert "uv" in fails(2, "evaluate", mesh)
+    assert "uv" in fails(2, "bake", mesh, "-o", tmp_path / "out")
+
+
+def test_an_onnx_file_that_is_not_ours_is_refused(tmp_path: Path, fails: Callable[..., str]) -> None:
+    points = tmp_path / "points.npy"
+    np.save(points, np.zeros((3, 3)))
+    foreign = text_file(tmp_path, "foreign.onnx", "not a network")
+    assert "foreign.onnx" in fails(2, "query", foreign, points, "-o", tmp_path / "uv.npz")
+    assert "absent.onnx" in fails(2, "query", tmp_path / "absent.onnx", points, "-o", tmp_path / "uv.npz")
+    assert not (tmp_path / "uv.npz").exists()
+
+
+def test_an_unknown_sample_lists_those_there_are(tmp_path: Path, fails: Callable[..., str]) -> None:
+    line = fails(2, "sample", "teapot", "-o", tmp_path / "teapot.ply")
+    assert "teapot" in line
+    assert "trefoil" in line
+
+
+def test_a_sample_is_written_once_and_not_over_another_file(tmp_path: Path, fails: Callable[..., str]) -> None:
+    mesh = tmp_path / "new" / "torus.ply"
+    assert main(["sample", "torus", "-o", str(mesh)]) == 0
+    first = mesh.read_bytes()
+    assert "--force" in fails(2, "sample", "torus", "-o", mesh)
+    assert main(["sample", "torus", "-o", str(mesh), "--force"]) == 0
+    assert mesh.read_bytes() == first
+    assert len(flexpara.runtime.load_asset(mesh).faces) > 100
+
+
+def test_a_sample_of_no_known_format_is_refused(tmp_path: Path, fails: Callable[..., str]) -> None:
+    assert ".docx" in fails(2, "sample", "torus", "-o", tmp_path / "torus.docx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_evaluate_shows_the_metrics_of_an_isometric_square(square: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", str(square), "--json"]) == 0
+    metrics = json.loads(capsys.readouterr().out)
+    assert metrics["charts"] == 1
+    assert metrics["flipped_faces"] == 0
+    assert metrics["symmetric_dirichlet_mean"] == pytest.approx(1.0)
+    assert main(["evaluate", str(square)]) == 0
+    table = capsys.readouterr().out
+    assert "charts" in table
+    assert "flipped" in table
+
+
+def test_interrupting_ends_with_130_and_one_line(
+    square: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: Callable[..., str]
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "unwrap_asset", interrupt)
+    assert "interrupted" in fails(130, "unwrap", square, "-o", tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*"))
+
+
+def test_a_defect_keeps_its_traceback(square: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def defect(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(cli, "unwrap_asset", defect)
+    with pytest.raises(ZeroDivisionError):
+        main(["unwrap", str(square), "-o", str(tmp_path / "out")])
+
+
+@pytest.mark.parametrize(
+    ("absent", "argv", "extra"),
+    [
+        ("torch", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[train]"),
+        ("igl", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[train]"),
+        ("moderngl", ["unwrap", "square.obj", "-o", "out"], "flexpara[bake]"),
+        ("moderngl", ["bake", "square.obj", "-o", "out"], "flexpara[bake]"),
+        ("OpenImageIO", ["bake", "square.obj", "-o", "out"], "flexpara[bake]"),
+    ],
+)
+def test_a_missing_dependency_ends_with_3_and_says_how_to_install_it(
+    absent: str, argv: list[str], extra: str, square: Path
+) -> None:
+    code = f"import sys; sys.modules[{absent!r}] = None; from flexpara.__main__ import main; sys.exit(main({argv!r}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=square.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 3, done.stderr
+    assert extra in done.stderr
+    assert absent in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (square.parent / "out").exists()
+
+
+def test_doctor_marks_what_is_missing_and_ends_with_0(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor"]) == 0
+    report = capsys.readouterr().out
+    for word in ("flexpara", "numpy", "torch", "CPU", "ONNX", "OpenGL"):
+        assert word in report
+    monkeypatch.setitem(sys.modules, "torch", None)
+    assert main(["doctor"]) == 0
+    assert 'pip install "flexpara[train]"' in capsys.readouterr().out
