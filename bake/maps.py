@@ -176,7 +176,8 @@ def to_tangent_space(normal: NDArray[np.float32], frame: NDArray[np.float32]) ->
     local[:, 2] = out * _dot(tangent, tangent) - along * mixed
     length = np.sqrt(_dot(local, local))
     local[length <= 1e-12] = FLAT
-    local /= np.where(length <= 1e-12, np.float32(1.0), length)[:, None]
+    length[length <= 1e-12] = 1.0
+    local /= length[:, None]
     return local
 
 
@@ -188,7 +189,7 @@ def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
 def _triple(a: NDArray[np.float32], b: NDArray[np.float32], c: NDArray[np.float32]) -> NDArray[np.float32]:
     """(t,) determinants a · (b × c) of rows."""
     x, y, z = (b[:, i] * c[:, j] - b[:, j] * c[:, i] for i, j in ((1, 2), (2, 0), (0, 1)))
-    return a[:, 0] * x + a[:, 1] * y + a[:, 2] * z
+    return np.asarray(a[:, 0] * x + a[:, 1] * y + a[:, 2] * z, np.float32)
 
 
 def without_opaque_alpha(color: NDArray[np.float32], gbuffer: GBuffer) -> NDArray[np.float32]:
