@@ -1,0 +1,144 @@
+"""Every number of training and finishing, in small frozen dataclasses that are saved with each result.
+
+Lengths are in the unit ball unless a docstring says otherwise; weights are dimensionless.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class NetConfig:
+    """Sizes of the networks.  The paper uses width 512 throughout; 64 gave the same charts on every mesh tried."""
+
+    width: int = 64
+    """Channels of the hidden layers of embedding, Unwrap- and Wrap-Nets."""
+    assign_width: int = 128
+    """Hidden channels of the deployed Assign-Net, which has to follow seams along mesh edges."""
+    assign_depth: int = 3
+    """Hidden layers of the deployed Assign-Net."""
+    octaves: int = 5
+    """Fourier octaves of the deployed Assign-Net's input."""
+    unwrap_octaves: int = 2
+    """Fourier octaves of the deployed Unwrap-Nets' input."""
+
+
+@dataclass(frozen=True)
+class StartConfig:
+    """The geometric start: clusters of surface samples, and networks fitted to them (design: measured prototype)."""
+
+    samples: int = 8000
+    """Surface samples that are clustered."""
+    normal_weight: float = 0.5
+    """Weight of the unit normal against the position in the clustering distance."""
+    rounds: int = 12
+    """Lloyd iterations."""
+    fit_steps: int = 200
+    """Steps of fitting the networks to cluster labels and plane projections."""
+
+
+@dataclass(frozen=True)
+class JointConfig:
+    """Joint training: the paper's score-weighted losses."""
+
+    steps: int = 400
+    """Optimizer steps."""
+    batch: int = 1024
+    """Surface samples a step."""
+    peak_rate: float = 4e-3
+    """Peak learning rate of the one-cycle schedule (AdamW)."""
+    distortion_weight: float = 1.0
+    """Weight of the ARAP energy of the 3D → 2D map."""
+    cycle_weight: float = 10.0
+    """Weight of |P − P_cycle|₁ (paper: α_c = 10)."""
+    normal_weight: float = 1.0
+    """Weight of the cosine distance of normals."""
+
+
+@dataclass(frozen=True)
+class LabelConfig:
+    """From chart probabilities to face labels."""
+
+    smoothing: float = 0.02
+    """Length that a seam may save before a face leaves its most probable chart, per unit of −log probability."""
+    crease_discount: float = 0.8
+    """How much cheaper a seam is along a sharp crease, in [0, 1)."""
+    islet_area: float = 0.004
+    """Pieces below this share of the surface join a neighbour."""
+
+
+@dataclass(frozen=True)
+class ContactConfig:
+    """Taking overlap inside a chart apart."""
+
+    rounds: int = 10
+    """Rounds of pinning, SLIM and the exact test."""
+    iterations: int = 2
+    """SLIM iterations a round."""
+    block: int = 3
+    """SLIM iterations between two tests where contacts are needed."""
+    margin: float = 0.01
+    """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
+    weight: float = 10.0
+    """Weight of the pins against the distortion energy."""
+    most: float = 0.5
+    """Share of the boundary that may be buried before the case is given up."""
+
+
+@dataclass(frozen=True)
+class ReliefConfig:
+    """Slits inside charts.  Lengths are shares of √(surface area)."""
+
+    price: float = 0.003
+    """Mean excess energy (symmetric Dirichlet − 1, share of the surface's area) that a slit of length 1 has to save."""
+    radius: float = 0.03
+    """Neighbourhood over which stress is averaged."""
+    shortest: float = 0.1
+    """Slits shorter than this are judged as if they had this length."""
+    iterations: int = 10
+    """SLIM iterations after each slit."""
+    failures: int = 3
+    """Slits that may fail to pay before a chart is left as it is."""
+    most: int = 12
+    """Slits a chart may get."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """How a slit that folds over itself is held apart."""
+    crease_discount: float = 0.8
+    """How much cheaper a slit is along a sharp crease, in [0, 1)."""
+
+
+@dataclass(frozen=True)
+class FinishConfig:
+    """From labels to valid charts."""
+
+    labels: LabelConfig = field(default_factory=LabelConfig)
+    relief: ReliefConfig = field(default_factory=ReliefConfig)
+    surrogate_faces: int = 6000
+    """Faces of the simplified surface on which charts are split and merged."""
+    trial_iterations: int = 10
+    """SLIM iterations of a flattening that is only weighed."""
+    rounds: int = 8
+    """Times the worst chart may be split."""
+    necks: int = 2
+    """Borders tried for each split and seed."""
+    polish_iterations: int = 10
+    """SLIM iterations a polishing round."""
+    polish_rounds: int = 3
+    """Polishing rounds a chart gets while each lowers its energy by ``polish_gain``."""
+    polish_gain: float = 0.03
+    """Share of a chart's excess energy that a polishing round has to save for another to follow."""
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """Everything that decides a result, together with the surface."""
+
+    charts: int = 8
+    """K: the most charts a connected surface may get."""
+    seed: int = 0
+    """Seed of all generators."""
+    net: NetConfig = field(default_factory=NetConfig)
+    start: StartConfig = field(default_factory=StartConfig)
+    joint: JointConfig = field(default_factory=JointConfig)
+    finish: FinishConfig = field(default_factory=FinishConfig)

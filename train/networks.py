@@ -1,0 +1,160 @@
+"""Networks of FlexPara's multi-chart mode (Zhao et al. 2025, section "Multi-Chart Neural Surface Parameterization").
+
+n points · p patches (the paper's K charts) · xyz in the unit ball · uv in chart coordinates · d width.
+All p Unwrap-Nets (and all p Wrap-Nets) are one batch of matrix products: no loop over patches.
+
+A *jet* carries a value and its two directional derivatives, (3, n, c) = (value, ∂/∂t₁, ∂/∂t₂), through a network in forward mode:
+two tangents cost about two more forward passes, where reverse mode would need one pass per output and a second-order graph.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from .config import NetConfig
+
+
+class Dense(nn.Module):
+    """One affine layer, or p of them side by side: (…, n, c_in) → (…, n, c_out).
+
+    With ``copies`` = p the weight is (p, c_in, c_out) and the input (n, c_in) or (p, n, c_in).
+    Initialised uniformly in ±√(3 gain / c_in): variance-preserving for SiLU at gain 2.
+    """
+
+    def __init__(
+        self, inputs: int, outputs: int, *, copies: int | None = None, gain: float = 2.0, generator: torch.Generator
+    ) -> None:
+        super().__init__()
+        shape = (inputs, outputs) if copies is None else (copies, inputs, outputs)
+        bound = math.sqrt(3.0 * gain / inputs)
+        self.weight = nn.Parameter((torch.rand(shape, generator=generator) * 2.0 - 1.0) * bound)
+        self.bias = nn.Parameter(torch.zeros((1, outputs) if copies is None else (copies, 1, outputs)))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Affine map of the last axis."""
+        return x @ self.weight + self.bias
+
+    def jet(self, x: Tensor) -> Tensor:
+        """Value and tangents, (3, …, n, c): only the value gets the bias."""
+        y = x @ self.weight
+        return torch.cat([y[:1] + self.bias, y[1:]])
+
+
+class Perceptron(nn.Module):
+    """Dense layers with SiLU between them, none after the last.
+
+    The paper takes LeakyReLU(0.01), whose derivative is piecewise constant: the distortion of a map then says nothing about
+    where its kinks should go.  SiLU gives the same shapes a useful gradient, which small networks need.
+    """
+
+    def __init__(self, channels: tuple[int, ...], *, copies: int | None = None, generator: torch.Generator) -> None:
+        super().__init__()
+        last = len(channels) - 2
+        self.layers = nn.ModuleList(
+            Dense(a, b, copies=copies, gain=1.0 if i == last else 2.0, generator=generator)
+            for i, (a, b) in enumerate(zip(channels, channels[1:], strict=False))
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(…, n, channels[0]) → (…, n, channels[-1])."""
+        for layer in self.layers[:-1]:
+            x = nn.functional.silu(layer(x))
+        return self.layers[-1](x)
+
+    def jet(self, x: Tensor) -> Tensor:
+        """The same on jets (3, …, n, c)."""
+        for layer in self.layers[:-1]:
+            x = silu_jet(layer.jet(x))
+        return self.layers[-1].jet(x)
+
+
+def silu_jet(x: Tensor) -> Tensor:
+    """SiLU of a jet: value → silu(value), tangent → silu'(value) · tangent."""
+    sigmoid = torch.sigmoid(x[:1])
+    slope = sigmoid * (1.0 + x[:1] * (1.0 - sigmoid))
+    return torch.cat([x[:1] * sigmoid, slope * x[1:]])
+
+
+class FourierFeatures(nn.Module):
+    """xyz → (xyz, sin 2^i π Bxyz, cos 2^i π Bxyz) for ``octaves`` i; octaves = 0 passes xyz through."""
+
+    def __init__(self, octaves: int) -> None:
+        super().__init__()
+        self.octaves = octaves
+
+    @property
+    def channels(self) -> int:
+        """Number of output channels."""
+        return 3 + 6 * self.octaves
+
+    def forward(self, xyz: Tensor) -> Tensor:
+        """(…, n, 3) → (…, n, channels)."""
+        if self.octaves == 0:
+            return xyz
+        phase = torch.cat([xyz * (math.pi * 2.0**i) for i in range(self.octaves)], dim=-1)
+        return torch.cat([xyz, torch.sin(phase), torch.cos(phase)], dim=-1)
+
+
+class Cycle(NamedTuple):
+    """What the 3D → 2D → 3D cycle yields for n points and p patches.
+
+    logits (n, p); uv_jet (3, p, n, 2): uv and its derivatives along two surface tangents; xyz (p, n, 3) and normal (p, n, 3):
+    what the Wrap-Nets make of uv (normals not normalised).
+    """
+
+    logits: Tensor
+    uv_jet: Tensor
+    xyz: Tensor
+    normal: Tensor
+
+
+class MultiChartNetworks(nn.Module):
+    """Embedding, Assign-Net, p Unwrap-Nets and p Wrap-Nets, trained jointly."""
+
+    def __init__(self, patches: int, config: NetConfig, *, generator: torch.Generator) -> None:
+        super().__init__()
+        width = config.width
+        self.embedding = Perceptron((3, width, width), generator=generator)
+        self.assign = Perceptron((width, width, patches), generator=generator)
+        self.unwrap = Perceptron((width, width, width, 2), copies=patches, generator=generator)
+        self.wrap = Perceptron((2, width, width, width, 6), copies=patches, generator=generator)
+
+    def scores(self, xyz: Tensor) -> Tensor:
+        """Logits of the Assign-Net: (n, 3) → (n, p)."""
+        return self.assign(nn.functional.silu(self.embedding(xyz)))
+
+    def forward(self, xyz: Tensor, tangents: Tensor) -> Cycle:
+        """The cycle at points xyz (n, 3) with unit tangents (2, n, 3)."""
+        feature = silu_jet(self.embedding.jet(torch.cat([xyz[None], tangents])))
+        uv_jet = self.unwrap.jet(feature[:, None])
+        wrapped = self.wrap(uv_jet[0])
+        return Cycle(self.assign(feature[0]), uv_jet, wrapped[..., :3], wrapped[..., 3:])
+
+
+class AtlasNetworks(nn.Module):
+    """What ships: Assign-Net and p Unwrap-Nets fitted to the finished charts.
+
+    forward: xyz (n, 3) in the unit ball → logits (n, p), uv (n, p, 2) in chart coordinates.
+    """
+
+    def __init__(self, patches: int, config: NetConfig, *, generator: torch.Generator) -> None:
+        super().__init__()
+        self.features = FourierFeatures(config.octaves)
+        self.unwrap_features = FourierFeatures(config.unwrap_octaves)
+        wide, width = config.assign_width, config.width
+        self.assign = Perceptron((self.features.channels, *(wide,) * config.assign_depth, patches), generator=generator)
+        self.unwrap = Perceptron(
+            (self.unwrap_features.channels, width, width, width, 2), copies=patches, generator=generator
+        )
+
+    def scores(self, xyz: Tensor) -> Tensor:
+        """Logits of the Assign-Net: (n, 3) → (n, p)."""
+        return self.assign(self.features(xyz))
+
+    def forward(self, xyz: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (n, p) and the uv of every patch (n, p, 2)."""
+        return self.scores(xyz), self.unwrap(self.unwrap_features(xyz)).transpose(0, 1)

@@ -1,0 +1,248 @@
+"""Split and merge: chart borders moved to where they pay, under the limit on the number of charts.
+
+Objective: Σ area · excess + price · (seams + slits), areas and lengths as shares of the surface.  A merge saves the border
+between two charts; a split costs one and frees what could not be flattened: a limb at its neck.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from .labels import DualGraph, border_lengths
+from .pieces import Piece, make_piece, relieved
+from .relief import excess
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..runtime.mesh import Surface
+    from .config import FinishConfig
+
+
+class Regrouping:
+    """The search's state: pieces of a surface, and the merges already weighed."""
+
+    def __init__(self, surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> None:
+        self.surface, self.graph, self.config = surface, graph, config
+        self.areas = surface.face_areas()
+        self.area = float(self.areas.sum())
+        self.unit = float(np.sqrt(self.area))
+        self.centroids = surface.triangles.mean(axis=1)
+        self.stubborn: set[int] = set()
+        self.pieces: dict[int, Piece] = {}
+        self.merges: dict[tuple[int, int], Piece | None] = {}
+        self._next = 0
+        for value in range(int(label.max()) + 1):
+            self.add_valid(np.flatnonzero(label == value))
+
+    def add(self, piece: Piece) -> int:
+        """Take a piece in; its key."""
+        self.pieces[self._next] = piece
+        self._next += 1
+        return self._next - 1
+
+    def add_valid(self, ids: NDArray[np.int64]) -> None:
+        """Faces as one valid piece, or halved until they are."""
+        piece = self.weigh(ids)
+        if piece is not None:
+            self.add(self.relieve(piece))
+            return
+        for half in halves(ids, self.graph, self.centroids, self.farthest(ids)):
+            self.add_valid(half)
+
+    def weigh(self, ids: NDArray[np.int64]) -> Piece | None:
+        """A plain flattening of the faces."""
+        return make_piece(self.surface, ids, self.area, self.config)
+
+    def relieve(self, piece: Piece, *, contacts: bool = False) -> Piece:
+        """Slit where it pays.  ``contacts``: hold slits apart that would overlap (slow), else leave such slits out."""
+        if piece.relieved and not contacts:
+            return piece
+        relief = self.config.relief
+        if not contacts:
+            relief = replace(relief, contact=replace(relief.contact, rounds=0))
+        return relieved(piece, self.area, relief)
+
+    def objective(self) -> float:
+        """Σ costs + price · borders."""
+        price = self.config.relief.price
+        return sum(piece.cost(price) for piece in self.pieces.values()) + price * sum(self.borders().values())
+
+    def farthest(self, ids: NDArray[np.int64]) -> int:
+        """The face of ids farthest from their mean."""
+        points = self.centroids[ids]
+        return int(ids[np.linalg.norm(points - points.mean(axis=0), axis=1).argmax()])
+
+    def label(self) -> NDArray[np.int64]:
+        """(f,) key of each face's piece."""
+        label = np.full(len(self.surface.faces), -1, dtype=np.int64)
+        for key, piece in self.pieces.items():
+            label[piece.ids] = key
+        return label
+
+    def borders(self) -> dict[tuple[int, int], float]:
+        """Length (in √A) of the border between each two adjacent pieces, lower key first."""
+        keys = sorted(self.pieces)
+        index = np.zeros(self._next, dtype=np.int64)
+        index[keys] = np.arange(len(keys))
+        matrix = border_lengths(index[self.label()], len(keys), self.graph) / self.unit
+        return {(keys[i], keys[j]): matrix[i, j] for i, j in zip(*np.nonzero(np.triu(matrix)), strict=True)}
+
+    def best_merge(self, excluded: set[int]) -> tuple[float, tuple[int, int], Piece] | None:
+        """The adjacent pair whose merge lowers the objective most (or raises it least): (gain, pair, piece)."""
+        price = self.config.relief.price
+        best = None
+        for pair, length in self.borders().items():
+            if excluded & set(pair):
+                continue
+            if pair not in self.merges:
+                self.merges[pair] = self.weigh(np.concatenate([self.pieces[k].ids for k in pair]))
+            merged = self.merges[pair]
+            if merged is None:
+                continue
+            gain = sum(self.pieces[k].cost(price) for k in pair) + price * length - merged.cost(price)
+            if best is None or gain > best[0]:
+                best = gain, pair, merged
+        return best
+
+    def apply_merge(self, pair: tuple[int, int], piece: Piece) -> None:
+        """Replace two pieces by one."""
+        for key in pair:
+            del self.pieces[key]
+        self.add(self.relieve(piece))
+
+    def best_split(self, key: int) -> tuple[float, list[Piece]] | None:
+        """The best way found to halve a piece: (gain, parts)."""
+        piece, price = self.pieces[key], self.config.relief.price
+        load = piece.flat.surface.face_areas() * excess(piece.flat)
+        best = None
+        for seed in {int(piece.ids[load.argmax()]), self.farthest(piece.ids)}:
+            for parts_ids in necks(piece.ids, self.graph, self.centroids, self.areas, seed, self.config.necks):
+                parts = [self.weigh(ids) for ids in parts_ids]
+                if any(part is None for part in parts):
+                    continue
+                whole = [self.relieve(part) for part in parts if part is not None]
+                cut = neck_length(parts_ids[0], parts_ids[1:], self.graph, len(self.surface.faces)) / self.unit
+                gain = piece.cost(price) - sum(part.cost(price) for part in whole) - price * cut
+                if best is None or gain > best[0]:
+                    best = gain, whole
+        return best
+
+    def search(self, most: int) -> None:
+        """Merge down to ``most`` pieces, then split and merge while that pays."""
+        while len(self.pieces) > most:
+            found = self.best_merge(set())
+            if found is None:
+                break
+            self.apply_merge(found[1], found[2])
+        for _ in range(self.config.rounds):
+            worst = max(
+                (key for key in self.pieces if key not in self.stubborn),
+                key=lambda key: self.pieces[key].cost(self.config.relief.price),
+                default=None,
+            )
+            if worst is None or not self.improve(worst, most):
+                break
+
+    def improve(self, key: int, most: int) -> bool:
+        """Split one piece, and merge two others where the limit asks for it; False when nothing is left to gain."""
+        if self.pieces[key].cost(self.config.relief.price) < self.config.relief.price * self.config.relief.shortest:
+            return False
+        split = self.best_split(key)
+        if split is not None and split[0] > 0.0:
+            room = len(self.pieces) + len(split[1]) - 1 <= most
+            merge = None if room else self.best_merge({key})
+            if room or (merge is not None and merge[0] + split[0] > 0.0):
+                del self.pieces[key]
+                for part in split[1]:
+                    self.add(part)
+                if merge is not None:
+                    self.apply_merge(merge[1], merge[2])
+                return True
+        self.stubborn.add(key)
+        return True
+
+
+def halves(
+    ids: NDArray[np.int64], graph: DualGraph, centroids: NDArray[np.float64], seed: int
+) -> list[NDArray[np.int64]]:
+    """The faces cut in two at half their distance from a seed face, as connected parts."""
+    distance = dual_distance(ids, graph, centroids, seed)
+    near = distance <= np.median(distance)
+    return connected_parts(ids, near, graph)
+
+
+def necks(
+    ids: NDArray[np.int64],
+    graph: DualGraph,
+    centroids: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    seed: int,
+    tries: int,
+) -> list[list[NDArray[np.int64]]]:
+    """The shortest borders between the faces near a seed and the rest: isolines of the distance, by length / smaller area^½.
+
+    Returns up to ``tries`` splittings, each as two connected parts or more.
+    """
+    distance = dual_distance(ids, graph, centroids, seed)
+    levels = np.quantile(distance, np.linspace(0.08, 0.92, 22))
+    i, j, length = inner_pairs(ids, graph, len(centroids))
+    crossing = np.stack([np.where((distance[i] <= t) != (distance[j] <= t), length, 0.0).sum() for t in levels])
+    share = np.stack([areas[ids][distance <= t].sum() for t in levels]) / areas[ids].sum()
+    quality = crossing / np.sqrt(np.maximum(np.minimum(share, 1.0 - share), 1e-9))
+    minima = [n for n in range(len(levels)) if quality[n] <= quality[max(n - 2, 0) : n + 3].min()]
+    found = []
+    for n in sorted(minima, key=lambda n: quality[n])[:tries]:
+        parts = connected_parts(ids, distance <= levels[n], graph)
+        if len(parts) == 2:
+            found.append(parts)
+    return found
+
+
+def inner_pairs(
+    ids: NDArray[np.int64], graph: DualGraph, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Dual edges inside a set of faces, as positions in ids, and their lengths."""
+    position = np.full(count, -1, dtype=np.int64)
+    position[ids] = np.arange(len(ids))
+    i, j = position[graph.pairs].T
+    inside = (i >= 0) & (j >= 0)
+    return i[inside], j[inside], graph.length[inside]
+
+
+def dual_distance(
+    ids: NDArray[np.int64], graph: DualGraph, centroids: NDArray[np.float64], seed: int
+) -> NDArray[np.float64]:
+    """(m,) distance of each face from the seed face, from centroid to centroid inside the piece."""
+    i, j, _ = inner_pairs(ids, graph, len(centroids))
+    step = np.linalg.norm(centroids[ids[i]] - centroids[ids[j]], axis=1) + 1e-12
+    links = sparse.csr_array((step, (i, j)), shape=(len(ids), len(ids)))
+    return dijkstra(links, directed=False, indices=int(np.flatnonzero(ids == seed)[0]))
+
+
+def connected_parts(
+    ids: NDArray[np.int64], near: NDArray[np.bool_], graph: DualGraph
+) -> list[NDArray[np.int64]]:
+    """The connected parts of ids when the dual edges between near and far are cut."""
+    i, j, _ = inner_pairs(ids, graph, int(max(graph.pairs.max(), ids.max())) + 1)
+    same = near[i] == near[j]
+    links = sparse.coo_array((np.ones(same.sum()), (i[same], j[same])), shape=(len(ids), len(ids)))
+    count, part = connected_components(links, directed=False)
+    return [ids[part == number] for number in range(count)]
+
+
+def neck_length(
+    first: NDArray[np.int64], others: list[NDArray[np.int64]], graph: DualGraph, count: int
+) -> float:
+    """Length of the border between one part and the others."""
+    side = np.zeros(count, dtype=np.int8)
+    side[first] = 1
+    for part in others:
+        side[part] = 2
+    i, j = side[graph.pairs].T
+    return float(graph.length[(i != j) & (i > 0) & (j > 0)].sum())
