@@ -219,13 +219,16 @@ def check_outputs(output: OutputFolder, outputs: Outputs, size: int, *, meshes: 
         names += [f"{output.stem}.{name}" for name in (*outputs.formats, "onnx")]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
     output.check([*names, output.report_name])
+    wanted = {"baker": bool(outputs.maps), "gltf": meshes and "glb" in outputs.formats, "preview": outputs.preview}
+    with requires("bake"):
+        for module in (name for name, needed in wanted.items() if needed):
+            import_module(f".bake.{module}", __name__)
     if outputs.maps or outputs.preview:
-        with requires("bake"):
-            from .bake import baker, context
-        limit = context.describe().max_size
+        from .bake.context import describe
+
+        limit = describe().max_size
         if outputs.maps and size > limit:
             raise InputError(f"size is {size}, this OpenGL device draws up to {limit} texels; pass --size {limit}")
-        del baker
 
 
 def check_maps(names: Sequence[str]) -> None:

@@ -1,10 +1,18 @@
-"""What all tests share: the import rule of this layout, and the folder of real meshes where there is one."""
+"""What all tests share: the import rule of this layout, real meshes, and a training that takes no time."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    from flexpara.runtime.mesh import Surface
+    from flexpara.runtime.progress import Progress
 
 MODELS = Path(__file__).resolve().parent.parent.parent / "shared" / "models"
 
@@ -30,3 +38,35 @@ def models() -> Path:
     if not MODELS.is_dir():
         pytest.skip(f"no real meshes at {MODELS}")
     return MODELS
+
+
+@pytest.fixture
+def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
+    """Replaces training: one chart, the projection onto the xy plane, with networks that know nothing of it.
+
+    Returns the surfaces it was asked to train, for tests of what happens before and after training.
+    """
+    torch = pytest.importorskip("torch")
+    from flexpara.runtime.mesh import Charts, Frame
+    from flexpara.train.config import NetConfig
+    from flexpara.train.networks import AtlasNetworks
+
+    trained: list[Surface] = []
+
+    def train(surface: Surface, settings: object, progress: Progress | None = None) -> SimpleNamespace:
+        del settings
+        trained.append(surface)
+        if progress is not None:
+            progress("train", 1, 1, 0.5)
+        none = np.zeros(len(surface.faces), np.int64)
+        return SimpleNamespace(
+            charts=Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",)),
+            networks=AtlasNetworks(1, NetConfig(), generator=torch.Generator().manual_seed(0)),
+            frame=Frame.of(surface.vertices),
+            report={},
+        )
+
+    module = ModuleType("flexpara.train.pipeline")
+    module.train = train  # pyright: ignore[reportAttributeAccessIssue]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    return trained

@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 
 import flexpara
+import flexpara.bake.context
 from flexpara import __main__ as cli
 from flexpara.__main__ import main
+from flexpara.bake.context import ContextInfo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+    from flexpara.runtime.mesh import Surface
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 UV_SQUARE = """v 0 0 0
@@ -55,6 +59,12 @@ def fails(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
         return printed.err
 
     return run
+
+
+def _points(folder: Path) -> Path:
+    """Three points on the square."""
+    np.save(folder / "points.npy", np.array([[0.1, 0.2, 0.0], [0.5, 0.5, 0.0], [0.9, 0.4, 0.0]]))
+    return folder / "points.npy"
 
 
 def text_file(folder: Path, name: str, text: str) -> Path:
@@ -145,8 +155,7 @@ def test_a_mesh_without_uv_can_be_neither_evaluated_nor_baked(tmp_path: Path, fa
 
 
 def test_an_onnx_file_that_is_not_ours_is_refused(tmp_path: Path, fails: Callable[..., str]) -> None:
-    points = tmp_path / "points.npy"
-    np.save(points, np.zeros((3, 3)))
+    points = _points(tmp_path)
     foreign = text_file(tmp_path, "foreign.onnx", "not a network")
     assert "foreign.onnx" in fails(2, "query", foreign, points, "-o", tmp_path / "uv.npz")
     assert "absent.onnx" in fails(2, "query", tmp_path / "absent.onnx", points, "-o", tmp_path / "uv.npz")
@@ -184,6 +193,73 @@ def test_evaluate_shows_the_metrics_of_an_isometric_square(square: Path, capsys:
     table = capsys.readouterr().out
     assert "charts" in table
     assert "flipped" in table
+
+
+QUICK = ("--size", "64", "--maps", "none", "--no-preview")
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_unwrap_writes_every_file_and_says_what_came_out(
+    square: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["unwrap", str(square), "-o", str(out), "--size", "64", "--maps", "auto,chart"]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    pictures = {"square_normal.png", "square_position.exr", "square_uv-checker.png", "square_chart.png"}
+    expected = {"square.glb", "square.onnx", "square.report.json", "square.preview.png"} | pictures
+    assert {path.name for path in out.iterdir()} == expected
+    assert all(str(out / name) in printed.out for name in expected)
+    assert "flipped faces" in printed.out
+    assert main(["query", str(out / "square.onnx"), str(_points(tmp_path)), "-o", str(tmp_path / "uv.npz")]) == 0
+    with np.load(tmp_path / "uv.npz") as answer:
+        assert answer["uv"].shape == (3, 2)
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_bake_takes_the_uv_of_any_mesh(square: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "maps"
+    argv = ["bake", str(square), "-o", str(out), "--maps", "position,normal", "--size", "32", "--texture-format", "exr"]
+    for _ in range(2):
+        assert main(argv) == 0
+        assert {path.name for path in out.iterdir()} == {"square_position.exr", "square_normal.exr", "square.bake.json"}
+        assert "square_position.exr" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_quiet_says_nothing(square: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["unwrap", str(square), "-o", str(tmp_path / "out"), "--quiet", *QUICK]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_foreign_file_is_refused_before_training(
+    square: Path, tmp_path: Path, fails: Callable[..., str], instant_training: list[Surface]
+) -> None:
+    foreign = text_file(tmp_path, "square.glb", "mine")
+    assert "--force" in fails(2, "unwrap", square, "-o", tmp_path, *QUICK)
+    assert foreign.read_text(encoding="utf-8") == "mine"
+    assert instant_training == []
+
+
+def test_the_input_is_never_overwritten(
+    square: Path, fails: Callable[..., str], instant_training: list[Surface]
+) -> None:
+    assert "square.obj" in fails(2, "unwrap", square, "-o", square.parent, "--format", "obj", "--force", *QUICK)
+    assert square.read_text(encoding="utf-8") == UV_SQUARE
+    assert instant_training == []
+
+
+def test_a_size_that_the_device_cannot_draw_is_refused_before_training(
+    square: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fails: Callable[..., str],
+    instant_training: list[Surface],
+) -> None:
+    small = ContextInfo(renderer="tiny", version="3.3", max_size=1024, hardware=False)
+    monkeypatch.setattr(flexpara.bake.context, "describe", lambda: small)
+    assert "1024" in fails(2, "unwrap", square, "-o", tmp_path / "out", "--size", "2048")
+    assert instant_training == []
 
 
 def test_interrupting_ends_with_130_and_one_line(

@@ -1,0 +1,111 @@
+"""The Python API: what unwrap takes and gives, what save writes.  Training is replaced: this tests the wiring."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import trimesh
+
+import flexpara
+from flexpara.runtime.errors import ForeignFileError, InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from flexpara.runtime.mesh import Surface
+
+VERTICES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+
+pytestmark = pytest.mark.usefixtures("instant_training")
+
+
+def unwrapped(*, charts: int = 8, padding: int | None = None, seed: int = 0) -> flexpara.UnwrapResult:
+    return flexpara.unwrap((VERTICES, FACES), size=64, charts=charts, padding=padding, seed=seed)
+
+
+def test_arrays_a_trimesh_and_a_file_give_the_same_atlas(tmp_path: Path) -> None:
+    mesh = trimesh.Trimesh(VERTICES, FACES, process=False)
+    mesh.export(tmp_path / "card.ply")
+    results = [unwrapped(), flexpara.unwrap(mesh, size=64), flexpara.unwrap(str(tmp_path / "card.ply"), size=64)]
+    for result in results:
+        np.testing.assert_array_equal(result.atlas.uv, results[0].atlas.uv)
+        np.testing.assert_array_equal(result.atlas.faces, results[0].atlas.faces)
+
+
+def test_the_same_seed_gives_the_same_bytes() -> None:
+    first, second = unwrapped(seed=3), unwrapped(seed=3)
+    assert first.onnx == second.onnx
+    np.testing.assert_array_equal(first.atlas.uv, second.atlas.uv)
+
+
+def test_the_report_holds_settings_metrics_and_agreement() -> None:
+    report = unwrapped(charts=5, padding=1).report
+    assert report["settings"]["charts"] == 5
+    assert report["settings"]["padding"] == 1
+    assert report["metrics"]["flipped_faces"] == 0
+    assert report["metrics"]["symmetric_dirichlet_mean"] == pytest.approx(1.0)
+    assert set(report["network"]) == {"rms_texels", "p99_texels", "chart_agreement", "points"}
+    assert set(report["seconds"]) == {"train", "pack", "measure", "export"}
+    json.dumps(report, allow_nan=False)
+
+
+def test_save_writes_what_it_names_and_the_session_reads_it(tmp_path: Path) -> None:
+    result = unwrapped()
+    paths = result.save(tmp_path / "out", maps=(), preview=False, formats=("glb", "obj", "ply"))
+    names = {path.name for path in paths}
+    assert names == {"mesh.glb", "mesh.obj", "mesh.ply", "mesh.onnx", "mesh.report.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    assert json.loads((tmp_path / "out" / "mesh.report.json").read_text(encoding="utf-8"))["files"] == sorted(names)
+    session = flexpara.runtime.UnwrapSession(tmp_path / "out" / "mesh.onnx")
+    uv, chart, score = session.unwrap(VERTICES)
+    assert uv.shape == (4, 2)
+    assert chart.tolist() == [0, 0, 0, 0]
+    assert score.tolist() == [1.0, 1.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize("kind", ["glb", "obj", "ply"])
+def test_each_format_gives_the_triangles_back_in_their_order(kind: str, tmp_path: Path) -> None:
+    result = unwrapped()
+    result.save(tmp_path, maps=(), preview=False, formats=(kind,))
+    back = flexpara.load(tmp_path / f"mesh.{kind}")
+    np.testing.assert_array_equal(back.surface.triangles, VERTICES[FACES])
+    assert back.uv is not None
+    np.testing.assert_allclose(back.uv[back.faces], result.atlas.corner_uv, atol=1e-6)
+
+
+def test_saving_again_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
+    result = unwrapped()
+    result.save(tmp_path, maps=(), preview=False)
+    result.save(tmp_path, maps=(), preview=False)
+    (tmp_path / "mesh.obj").write_text("mine", encoding="utf-8")
+    with pytest.raises(ForeignFileError, match=r"mesh\.obj.*--force"):
+        result.save(tmp_path, maps=(), preview=False, formats=("obj",))
+    assert (tmp_path / "mesh.obj").read_text(encoding="utf-8") == "mine"
+    result.save(tmp_path, maps=(), preview=False, formats=("obj",), force=True)
+    assert (tmp_path / "mesh.obj").read_text(encoding="utf-8") != "mine"
+
+
+def test_progress_sees_every_stage_of_unwrapping_and_saving(tmp_path: Path) -> None:
+    stages: list[str] = []
+
+    def progress(stage: str, step: int, steps: int, loss: float | None = None) -> None:
+        assert 0 <= step <= steps
+        assert loss is None or stage == "train"
+        stages.append(stage)
+
+    result = flexpara.unwrap((VERTICES, FACES), size=64, progress=progress)
+    result.save(tmp_path, maps=(), preview=False, progress=progress)
+    assert list(dict.fromkeys(stages)) == ["train", "pack", "measure", "export", "write"]
+
+
+def test_options_are_checked_before_anything_is_read(tmp_path: Path, instant_training: list[Surface]) -> None:
+    with pytest.raises(InputError, match="charts is 0"):
+        flexpara.unwrap(tmp_path / "absent.obj", charts=0)
+    with pytest.raises(InputError, match="unknown map"):
+        unwrapped().save(tmp_path / "out", maps=("shiny",))
+    assert not (tmp_path / "out").exists()
+    assert len(instant_training) == 1
