@@ -1,23 +1,18 @@
 """glTF 2.0 (.glb, .gltf) → RawMesh: the triangles of the default scene, node transforms applied, in scene order.
 
-Words of the specification (Khronos, glTF 2.0.1): accessor, bufferView, primitive, node.  uv is turned v up; linear
-COLOR_0 becomes sRGB.  Read here and not with trimesh, which drops uv without a material, ignores `normalized` and
-trusts any count.
+Words of the specification (Khronos, glTF 2.0.1): accessor, primitive, node.  uv is turned v up; linear COLOR_0 becomes
+sRGB.  Read here and not with trimesh, which drops uv without a material, ignores `normalized` and trusts any count.
 """
 
 from __future__ import annotations
 
-import base64
-import binascii
-import json
 import struct
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
 from .errors import MeshError
+from .gltfbuffers import GltfFile, buffer_view, parse_tree, read_accessor, read_buffers, read_resource
 from .materials import decode_image, linear_to_srgb
 from .mesh import Material
 from .rawmesh import MAX_FACES, RawMesh, merge, transformed
@@ -27,21 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-GLB_MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
-COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 TRIANGLES, STRIP, FAN = 4, 5, 6
-UNREADABLE = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 TRANSFORM = "KHR_texture_transform"
-
-
-@dataclass(frozen=True, eq=False)
-class _File:
-    """The JSON tree, its buffers' bytes, and the folder its references may reach."""
-
-    tree: dict[str, Any]
-    buffers: list[bytes]
-    folder: Path
 
 
 def read_gltf(data: bytes, folder: Path) -> RawMesh:
@@ -55,120 +37,24 @@ def read_gltf(data: bytes, folder: Path) -> RawMesh:
         MeshError: damaged, compressed in a way that is not read, without triangles, or with such a reference.
     """
     try:
-        tree, binary = _tree(data)
-        file = _File(tree, _buffers(tree, binary, folder), folder)
+        tree, binary = parse_tree(data)
+        file = GltfFile(tree, read_buffers(tree, binary, folder), folder)
         return _scene(file)
     except MeshError:
         raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error, RecursionError) as error:
+    except (
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        OverflowError,
+        struct.error,
+        RecursionError,
+    ) as error:
         raise MeshError(
             f"the glTF file is damaged ({type(error).__name__}: {error}), expected glTF 2.0; export it again"
         ) from error
-
-
-def _tree(data: bytes) -> tuple[dict[str, Any], bytes | None]:
-    if data[:4] != b"glTF":
-        tree, binary = json.loads(data.decode("utf-8-sig")), None
-    else:
-        chunks: dict[int, bytes] = {}
-        start, end = 12, min(len(data), struct.unpack_from("<I", data, 8)[0])
-        while start + 8 <= end:
-            length, kind = struct.unpack_from("<II", data, start)
-            if start + 8 + length > len(data):
-                raise MeshError("the GLB file is cut short, expected the length in its header; copy or export it again")
-            chunks.setdefault(kind, data[start + 8 : start + 8 + length])
-            start += 8 + length
-        tree, binary = json.loads(chunks[JSON_CHUNK].decode("utf-8")), chunks.get(BINARY_CHUNK)
-    version = str(tree["asset"]["version"])
-    if not version.startswith("2."):
-        raise MeshError(f"glTF version {version[:20]}, expected 2.x; convert the file")
-    compressed = [name for name in UNREADABLE if name in tree.get("extensionsRequired", [])]
-    if compressed:
-        raise MeshError(
-            f"the glTF file is compressed ({compressed[0]}), which is not read; export it without compression"
-        )
-    return tree, binary
-
-
-def _buffers(tree: dict[str, Any], binary: bytes | None, folder: Path) -> list[bytes]:
-    result = []
-    for buffer in tree.get("buffers", []):
-        if "uri" in buffer:
-            result.append(_resource(buffer["uri"], folder))
-        elif binary is not None:
-            result.append(binary)
-        else:
-            raise MeshError("a glTF buffer has neither data nor uri; export the file again")
-    return result
-
-
-def _resource(uri: str, folder: Path) -> bytes:
-    """Bytes of a data URI, or of a file inside the folder."""
-    if uri.startswith("data:"):
-        head, _, body = uri.partition(",")
-        try:
-            return base64.b64decode(body) if head.endswith(";base64") else unquote(body).encode("latin-1")
-        except (binascii.Error, UnicodeEncodeError) as error:
-            raise MeshError(f"a data URI of the glTF file is damaged ({error}); export it again") from error
-    path = (folder / unquote(uri)).resolve()
-    if urlsplit(uri).scheme or not path.is_relative_to(folder.resolve()):
-        raise MeshError(
-            f"the glTF file refers to {uri[:120]!r}, expected files in its own folder; embed it (export as .glb)"
-        )
-    if not path.is_file():
-        raise MeshError(
-            f"the glTF file refers to {uri[:120]!r}, which does not lie beside it; copy it there or export as .glb"
-        )
-    return path.read_bytes()
-
-
-def _view(file: _File, index: int) -> tuple[memoryview, dict[str, Any]]:
-    view = file.tree["bufferViews"][index]
-    start = view.get("byteOffset", 0)
-    data = memoryview(file.buffers[view["buffer"]])[start : start + view["byteLength"]]
-    if start < 0 or len(data) != view["byteLength"]:
-        raise MeshError(f"glTF bufferView {index} ends behind its buffer; the file is damaged: export it again")
-    return data, view
-
-
-def _table(
-    data: memoryview, offset: int, stride: int, count: int, dtype: type[np.generic], columns: int
-) -> NDArray[Any]:
-    """(count, columns) from strided bytes; a view beyond the data raises ValueError or TypeError."""
-    layout = np.dtype(
-        {"names": ["row"], "formats": [(np.dtype(dtype).newbyteorder("<"), (columns,))], "itemsize": stride}
-    )
-    whole = count - 1
-    last = np.frombuffer(data, dtype=np.dtype(dtype).newbyteorder("<"), count=columns, offset=offset + whole * stride)
-    rows = np.frombuffer(data, dtype=layout, count=whole, offset=offset)["row"].reshape(whole, columns)
-    return np.concatenate([rows, last[None]])
-
-
-def _accessor(file: _File, index: int) -> NDArray[Any]:
-    """(count, columns): float64 where the component is float or normalized, else its integer type."""
-    accessor = file.tree["accessors"][index]
-    dtype, columns, count = COMPONENTS[accessor["componentType"]], COLUMNS[accessor["type"]], accessor["count"]
-    if not 0 < count <= 3 * MAX_FACES:
-        raise MeshError(
-            f"glTF accessor {index} holds {count} elements, expected 1 to {3 * MAX_FACES}; export the file again"
-        )
-    width = np.dtype(dtype).itemsize * columns
-    if "bufferView" in accessor:
-        data, view = _view(file, accessor["bufferView"])
-        values = _table(data, accessor.get("byteOffset", 0), view.get("byteStride", width), count, dtype, columns)
-    else:
-        values = np.zeros((count, columns), dtype=dtype)
-    if "sparse" in accessor:
-        sparse = accessor["sparse"]
-        where, what = sparse["indices"], sparse["values"]
-        kind = COMPONENTS[where["componentType"]]
-        places, _ = _view(file, where["bufferView"])
-        entries, _ = _view(file, what["bufferView"])
-        place = _table(places, where.get("byteOffset", 0), np.dtype(kind).itemsize, sparse["count"], kind, 1)[:, 0]
-        values[place] = _table(entries, what.get("byteOffset", 0), width, sparse["count"], dtype, columns)
-    if accessor.get("normalized") and values.dtype.kind in "iu":
-        return np.maximum(values / np.iinfo(dtype).max, -1.0)
-    return values.astype(np.float64) if values.dtype.kind == "f" else values
 
 
 def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
@@ -212,7 +98,7 @@ def _placed_meshes(tree: dict[str, Any]) -> list[tuple[int, NDArray[np.float64]]
     return placed
 
 
-def _scene(file: _File) -> RawMesh:
+def _scene(file: GltfFile) -> RawMesh:
     materials, changes = _materials(file)
     parts, skipped, faces = [], 0, 0
     for mesh, world in _placed_meshes(file.tree):
@@ -232,16 +118,16 @@ def _scene(file: _File) -> RawMesh:
     return whole
 
 
-def _primitive(file: _File, primitive: dict[str, Any], materials: list[Material]) -> RawMesh:
+def _primitive(file: GltfFile, primitive: dict[str, Any], materials: list[Material]) -> RawMesh:
     attributes = primitive["attributes"]
-    positions = _accessor(file, attributes["POSITION"]).astype(np.float64)
-    indices = _accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(positions))
+    positions = read_accessor(file, attributes["POSITION"]).astype(np.float64)
+    indices = read_accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(positions))
     faces = _triangles(indices.astype(np.int64), primitive.get("mode", TRIANGLES))
-    normals = _accessor(file, attributes["NORMAL"]).astype(np.float64) if "NORMAL" in attributes else None
+    normals = read_accessor(file, attributes["NORMAL"]).astype(np.float64) if "NORMAL" in attributes else None
     index = primitive.get("material")
     name = f"TEXCOORD_{_base_texture(file.tree, index).get('texCoord', 0)}"
-    uv = _accessor(file, attributes[name]).astype(np.float64) if name in attributes else None
-    colors = _srgb(_accessor(file, attributes["COLOR_0"])) if "COLOR_0" in attributes else None
+    uv = read_accessor(file, attributes[name]).astype(np.float64) if name in attributes else None
+    colors = _srgb(read_accessor(file, attributes["COLOR_0"])) if "COLOR_0" in attributes else None
     if any(values is not None and len(values) != len(positions) for values in (normals, uv, colors)):
         raise MeshError("a glTF primitive has attributes of different lengths; export the file again")
     return RawMesh(
@@ -281,7 +167,7 @@ def _base_texture(tree: dict[str, Any], material: int | None) -> dict[str, Any]:
     return tree["materials"][material].get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
 
 
-def _materials(file: _File) -> tuple[list[Material], dict[str, int]]:
+def _materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
     """Base colours; counts textures that can't be had and texture transforms that are ignored."""
     result, changes = [], {"missing_textures": 0, "ignored_texture_transforms": 0}
     pictures: dict[int, NDArray[np.uint8]] = {}
@@ -302,7 +188,11 @@ def _materials(file: _File) -> tuple[list[Material], dict[str, int]]:
     return result, changes
 
 
-def _picture(file: _File, index: int) -> NDArray[np.uint8]:
+def _picture(file: GltfFile, index: int) -> NDArray[np.uint8]:
     image = file.tree["images"][index]
-    data = bytes(_view(file, image["bufferView"])[0]) if "bufferView" in image else _resource(image["uri"], file.folder)
+    data = (
+        bytes(buffer_view(file, image["bufferView"])[0])
+        if "bufferView" in image
+        else read_resource(image["uri"], file.folder)
+    )
     return decode_image(data)

@@ -21,7 +21,7 @@ from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
 from .cleaning import clean
-from .errors import MeshError, MissingDependencyError, MissingFileError, ShapeError
+from .errors import InputError, MeshError, MissingDependencyError, MissingFileError, ShapeError
 from .gltffile import read_gltf
 from .materials import picture_pixels, read_in_folder
 from .mesh import Asset, Material
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 8 << 30
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip"})
+REMEDY = "pip install 'trimesh[easy]', or convert the file"
 MADE_UP_GREY = [102, 102, 102, 255]
 ARCHIVES = frozenset({"3mf", "3dxml", "zae"})
 
@@ -126,9 +127,7 @@ def _read(data: bytes, path: Path) -> RawMesh:
             f"extension {path.suffix!r} is no mesh format, expected .obj .ply .stl .glb .gltf .off …; convert the file"
         )
     if isinstance(loader, ExceptionWrapper):
-        raise MissingDependencyError(
-            f"{path}: trimesh reads .{kind} with packages that are absent; pip install 'trimesh[easy]'"
-        )
+        raise MissingDependencyError(f".{kind} needs packages that are absent; {REMEDY}")
     if kind in ARCHIVES:
         _check_archive(data)
     return _read_with_trimesh(data, kind, path.parent)
@@ -172,13 +171,29 @@ class _FolderResolver(Resolver):
 
 
 def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
-    options: dict[str, Any] = {"fix_texture": False} if kind == "ply" else {}
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=_FolderResolver(folder), process=False, **options
-        )
+        parts, others = _trimesh_parts(data, kind, folder)
+    except InputError:
+        raise
+    except ImportError as error:
+        if error.name == "charset_normalizer":
+            raise MeshError(
+                "its text is not UTF-8, expected a readable file; save it as UTF-8 or convert it"
+            ) from error
+        raise MissingDependencyError(f".{kind} needs a package that is absent ({error}); {REMEDY}") from error
     except Exception as error:
-        raise MeshError(f"not readable as .{kind} ({type(error).__name__}: {error}); export it again") from error
+        raise MeshError(f"not readable as .{kind} ({_first_line(error)}); export it again") from error
+    if not parts:
+        found = "points or lines only (point clouds come in a later version)" if others else "no face"
+        raise MeshError(f"the file holds {found}, expected triangles; give a triangle mesh")
+    return merge(parts)
+
+
+def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh], int]:
+    """The meshes of the scene in its order, and how many other things with vertices it holds."""
+    options: dict[str, Any] = {"fix_texture": False} if kind == "ply" else {}
+    resolver = _FolderResolver(folder)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=resolver, process=False, **options)
     parts, others = [], 0
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
@@ -187,10 +202,12 @@ def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
             parts.append(_part(geometry, np.asarray(matrix, dtype=np.float64)))
         else:
             others += len(getattr(geometry, "vertices", ())) > 0
-    if not parts:
-        found = "points or lines only (point clouds come in a later version)" if others else "no face"
-        raise MeshError(f"the file holds {found}, expected triangles; give a triangle mesh")
-    return merge(parts)
+    return parts, others
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).splitlines()
+    return f"{type(error).__name__}: {text[0][:200]}" if text else type(error).__name__
 
 
 def _part(mesh: trimesh.Trimesh, matrix: NDArray[np.float64]) -> RawMesh:

@@ -125,7 +125,7 @@ def _corners(lines: _Lines, vertex_count: int) -> tuple[NDArray[np.int64], NDArr
         )
     try:
         table = _index_table([word for polygon in words for word in polygon])
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise MeshError(f"a face of the OBJ file has a corner that is no index ({error}); export it again") from error
     polygon = np.repeat(np.arange(len(size)), size)
     sizes = (vertex_count, len(lines.text["vt"]), len(lines.text["vn"]))

@@ -114,7 +114,7 @@ def merge(parts: Sequence[RawMesh]) -> RawMesh:
     kept.  Each of these is counted in changes.
     """
     offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
-    materials = list({id(material): material for part in parts for material in part.materials}.values())
+    materials, face_material = _joined_materials(parts)
     changes: dict[str, int] = {}
     for part in parts:
         for name, count in part.changes.items():
@@ -128,8 +128,8 @@ def merge(parts: Sequence[RawMesh]) -> RawMesh:
         normals=np.concatenate([part.normals for part in parts if part.normals is not None]) if has_normals else None,
         colors=_joined_colors(parts, changes),
         uv=_joined_uv(parts, changes),
-        materials=tuple(materials),
-        face_material=_joined_materials(parts, materials),
+        materials=materials,
+        face_material=face_material,
         changes=changes,
     )
 
@@ -152,18 +152,19 @@ def _joined_uv(parts: Sequence[RawMesh], changes: dict[str, int]) -> NDArray[np.
     return np.concatenate([np.zeros((len(part.positions), 2)) if part.uv is None else part.uv for part in parts])
 
 
-def _joined_materials(parts: Sequence[RawMesh], materials: list[Material]) -> NDArray[np.int64] | None:
-    """(f,) int64; a part without material takes a default one, which is appended to `materials` when needed."""
+def _joined_materials(
+    parts: Sequence[RawMesh],
+) -> tuple[tuple[Material, ...], NDArray[np.int64] | None]:
+    """Each Material object once, and the (f,) one of each face; parts without any share a default one, the last."""
+    materials = list({id(material): material for part in parts for material in part.materials}.values())
     if not materials:
-        return None
-    if any(part.face_material is None for part in parts):
-        materials.append(Material(name="default"))
+        return (), None
     place = {id(material): index for index, material in enumerate(materials)}
     columns = []
     for part in parts:
-        if part.face_material is None:
-            columns.append(np.full(len(part.faces), len(materials) - 1, dtype=np.int64))
-        else:
-            own = np.array([place[id(material)] for material in part.materials], dtype=np.int64)
-            columns.append(own[part.face_material])
-    return np.concatenate(columns)
+        own = np.array([place[id(material)] for material in part.materials], dtype=np.int64)
+        bare = np.full(len(part.faces), len(materials), dtype=np.int64)
+        columns.append(bare if part.face_material is None else own[part.face_material])
+    if any(part.face_material is None for part in parts):
+        materials.append(Material(name="default"))
+    return tuple(materials), np.concatenate(columns)

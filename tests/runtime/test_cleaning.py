@@ -8,7 +8,7 @@ import pytest
 from flexpara.runtime.cleaning import clean, degenerate_faces, inconsistent_faces, weld_vertices
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.mesh import Asset
-from flexpara.runtime.rawmesh import MAX_FACES, RawMesh, check, merge, split_at_corners, transformed
+from flexpara.runtime.rawmesh import RawMesh
 from flexpara.runtime.samples import make_sample
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -125,16 +125,19 @@ def test_each_component_has_its_own_majority() -> None:
     assert agrees(asset.surface.faces)
 
 
-def test_a_moebius_band_is_flipped_along_a_tree_only() -> None:
-    """Slow twin: every orientation of a Möbius band leaves a disagreement; the best leaves one cut line."""
+@pytest.mark.parametrize("seed", range(4))
+def test_a_moebius_band_is_left_with_one_disagreement(seed: int) -> None:
+    """It is a ring of faces: a spanning tree leaves one edge of it, and that one can't agree."""
     count = 12
     top, bottom = np.arange(count), np.arange(count) + count
-    after_top = np.append(top[1:], bottom[0])
-    after_bottom = np.append(bottom[1:], top[0])
+    after_top, after_bottom = np.append(top[1:], bottom[0]), np.append(bottom[1:], top[0])
     faces = np.concatenate([np.stack([top, after_top, bottom], 1), np.stack([after_top, after_bottom, bottom], 1)])
+    turned = np.random.default_rng(seed).random(len(faces)) < 0.5
+    faces = np.where(turned[:, None], faces[:, [0, 2, 1]], faces)
     flip = inconsistent_faces(faces)
-    assert not agrees(np.where(flip[:, None], faces[:, [0, 2, 1]], faces))
-    assert int(flip.sum()) <= count
+    faces = np.where(flip[:, None], faces[:, [0, 2, 1]], faces)
+    directed = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    assert len(directed) - len(np.unique(directed, axis=0)) == 1
 
 
 def test_non_manifold_edges_are_counted_and_allowed() -> None:
@@ -161,7 +164,7 @@ def test_two_faces_that_share_two_edges_do_not_confuse_the_orientation() -> None
         (TRIANGLE, [[0, 1, 3]], r"face 0 refers to vertices \[0, 1, 3\], expected 0 to 2"),
         (TRIANGLE, [[0, 1, -1]], "face 0 refers"),
         (np.where(np.eye(3) > 0, np.nan, TRIANGLE), [[0, 1, 2]], r"3 of 3 vertices .*first: vertex 0"),
-        (TRIANGLE + [[0], [0], [np.inf]], [[0, 1, 2]], r"1 of 3 vertices .*first: vertex 2"),
+        (np.where(np.arange(3)[:, None] == 2, np.inf, TRIANGLE), [[0, 1, 2]], r"1 of 3 vertices .*first: vertex 2"),
         (TRIANGLE * 1e120, [[0, 1, 2]], "coordinates reach"),
         (TRIANGLE * 1e-120, [[0, 1, 2]], "diagonal"),
         (TRIANGLE * 0.0, [[0, 1, 2]], "diagonal 0"),
@@ -173,42 +176,3 @@ def test_what_is_no_surface_is_refused(positions: np.ndarray, faces: list[list[i
     with pytest.raises(MeshError, match=message) as caught:
         cleaned(positions, faces)
     assert "\n" not in str(caught.value)
-
-
-def test_too_many_faces_are_refused() -> None:
-    faces = np.broadcast_to(np.array([0, 1, 2]), (MAX_FACES + 1, 3))
-    with pytest.raises(MeshError, match="decimate"):
-        check(RawMesh(positions=TRIANGLE, faces=faces))
-
-
-def test_corner_uv_split_vertices_only_where_they_differ() -> None:
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    uv = SQUARE[faces][:, :, :2].copy()
-    assert len(split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv).positions) == 4
-    uv[1] += 5.0
-    part = split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv)
-    assert part.uv is not None
-    assert len(part.positions) == 6
-    np.testing.assert_array_equal(part.uv[part.faces], uv)
-    np.testing.assert_array_equal(part.positions[part.faces], SQUARE[faces])
-
-
-def test_a_mirroring_transform_keeps_the_outside_outside() -> None:
-    vertices, faces = make_sample("sphere", resolution=12)
-    world = np.diag([-2.0, 1.0, 3.0, 1.0])
-    part = transformed(RawMesh(positions=vertices, faces=faces, normals=vertices), world)
-    surface = cleaned(part.positions, part.faces).surface
-    assert part.normals is not None
-    assert (np.einsum("fc,fc->f", surface.face_cross(), surface.triangles.mean(axis=1)) > 0.0).all()
-    assert (np.einsum("nc,nc->n", part.normals, part.positions) > 0.0).all()
-    np.testing.assert_allclose(np.linalg.norm(part.normals, axis=1), 1.0)
-
-
-def test_merging_counts_what_only_some_parts_have() -> None:
-    rich = RawMesh(TRIANGLE, np.array([[0, 1, 2]]), normals=TRIANGLE, uv=TRIANGLE[:, :2])
-    poor = RawMesh(TRIANGLE + 3.0, np.array([[0, 1, 2]]))
-    whole = merge([rich, poor])
-    assert whole.normals is None
-    assert whole.uv is not None
-    np.testing.assert_array_equal(whole.faces, [[0, 1, 2], [3, 4, 5]])
-    assert whole.changes == {"dropped_normals": 3, "faces_without_uv": 1}

@@ -37,9 +37,13 @@ def test_files_appear_together_at_commit(tmp_path: Path) -> None:
 def test_an_error_leaves_the_folder_as_it_was(tmp_path: Path, error: type[BaseException]) -> None:
     run(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with pytest.raises(error), OutputFolder(tmp_path, "bunny") as output:
-        output.write("bunny.glb", text("two"))
+
+    def fail(path: Path) -> None:
+        path.write_text("half", encoding="utf-8")
         raise error
+
+    with pytest.raises(error), OutputFolder(tmp_path, "bunny") as output:
+        output.write("bunny.glb", fail)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
