@@ -193,18 +193,11 @@ def _asset(
     renumber = np.full(len(raw.positions), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
     new_weld = _by_first_appearance(weld[used])
-    faces = renumber[corners]
-    surface = Surface(vertices=raw.positions[used][_first_of_each(new_weld)], faces=new_weld[faces])
-    edges = _face_edges(surface.faces)
-    components = int(connected_labels(edges.links, len(faces)).max()) + 1
-    counts = {
-        **raw.changes,
-        "unreferenced_vertices": len(raw.positions) - len(used),
-        "non_manifold_edges": edges.non_manifold,
-        "components": components if components > 1 else 0,
-    }
+    faces, positions = renumber[corners], raw.positions[used]
+    surface = Surface(vertices=positions[_first_of_each(new_weld)], faces=new_weld[faces])
+    counts = {**raw.changes, "unreferenced_vertices": len(raw.positions) - len(used), **_edge_counts(surface.faces)}
     return Asset(
-        positions=raw.positions[used],
+        positions=positions,
         faces=faces,
         weld=new_weld,
         surface=surface,
@@ -217,6 +210,13 @@ def _asset(
         sha256=sha256,
         stem=stem,
     )
+
+
+def _edge_counts(faces: NDArray[np.int64]) -> dict[str, int]:
+    """Edges with three faces or more, and pieces joined by edges where there are several."""
+    edges = _face_edges(faces)
+    components = int(connected_labels(edges.links, len(faces)).max()) + 1
+    return {"non_manifold_edges": edges.non_manifold, "components": components if components > 1 else 0}
 
 
 def _equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
