@@ -51,19 +51,25 @@ COLUMNS = {
 }  # fmt: skip
 
 
+WATCH = """import json, resource, subprocess, sys, time
+start = time.perf_counter()
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+print(json.dumps([code, time.perf_counter() - start, used / 1024]))"""
+
+
 def timed(command: list[str]) -> tuple[float, float]:
-    """Run a command from the repository root: (wall seconds, peak resident MB).  Raises: RuntimeError when it fails."""
-    with tempfile.TemporaryFile() as errors:
-        start = time.perf_counter()
-        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=errors)
-        _, status, usage = os.wait4(process.pid, 0)
-        seconds = time.perf_counter() - start
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            errors.seek(0)
-            last = errors.read().decode(errors="replace").strip().splitlines()[-1:]
-            raise RuntimeError(f"{' '.join(command[1:4])} ended with {process.returncode}: {' '.join(last)}")
-    return seconds, usage.ru_maxrss / 1024.0
+    """Run a command from the repository root: (wall seconds, peak resident MB).  Raises: RuntimeError when it fails.
+
+    A bare interpreter starts and watches it: a process begins with the peak memory of the one that started it.
+    """
+    watched = [sys.executable, "-S", "-c", WATCH, *command]
+    done = subprocess.run(watched, cwd=ROOT, capture_output=True, text=True, check=True)
+    code, seconds, peak = json.loads(done.stdout)
+    if code:
+        last = " ".join(done.stderr.strip().splitlines()[-1:])
+        raise RuntimeError(f"{' '.join(command[1:4])} ended with {code}: {last}")
+    return seconds, peak
 
 
 def measured(asset: Asset, corner_uv: np.ndarray) -> Row:
@@ -119,7 +125,8 @@ def flexpara_row(path: Path, asset: Asset, arguments: argparse.Namespace, folder
     network = json.loads((folder / f"{path.stem}.report.json").read_text(encoding="utf-8"))["network"]
     row = measured(asset, made.uv[made.faces])
     row |= {"seconds": statistics.median(run[0] for run in runs), "peak_mb": max(run[1] for run in runs)}
-    return row | {"rms_texels": network["rms_texels"], "agreement": network["chart_agreement"]}
+    rms = float("inf") if network["rms_texels"] is None else network["rms_texels"]
+    return row | {"rms_texels": rms, "agreement": network["chart_agreement"]}
 
 
 def judge(row: Row, arguments: argparse.Namespace) -> list[str]:
