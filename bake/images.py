@@ -5,7 +5,7 @@ PNG carries no colour chunk (glTF ignores them, other readers disagree about the
 
 | encoding | values in memory | in PNG | in EXR |
 |---|---|---|---|
-| srgb | linear light in [0, 1], a fourth channel is alpha | sRGB curve, alpha as it is | linear |
+| srgb | linear light in [0, 1], a fourth channel is alpha, straight | sRGB curve, alpha as it is | linear |
 | unit | [0, 1] | as it is | as it is |
 | signed | [−1, 1] | (value + 1) / 2 | as it is |
 | linear | any real number | refused | as it is |
@@ -41,6 +41,8 @@ PNG_LEVEL = 3
 EXR_COMPRESSION = "zip:2"
 PNG_CHUNKS = (b"IHDR", b"IDAT", b"IEND")
 HALF_MAX = 65504.0
+STRAIGHT_ALPHA = "oiio:UnassociatedAlpha"
+"""Without this word OpenImageIO divides or multiplies the colours of a PNG by its alpha."""
 
 
 class EncodingError(InputError):
@@ -90,7 +92,7 @@ def encode_png(texture: Texture, *, bits: Bits | None = None) -> bytes:
     levels = quantize(texture, bits=bits)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "texture.png"
-        _write(path, levels, {"png:compressionLevel": PNG_LEVEL})
+        _write(path, levels, {"png:compressionLevel": PNG_LEVEL, STRAIGHT_ALPHA: 1})
         return strip_png(path.read_bytes())
 
 
@@ -154,7 +156,9 @@ def read_image(path: Path) -> NDArray[np.generic]:
 
     Raises: InputError when the file can't be read.
     """
-    source = oiio.ImageInput.open(str(path))
+    options = oiio.ImageSpec()
+    options.attribute(STRAIGHT_ALPHA, 1)
+    source = oiio.ImageInput.open(str(path), options)
     if source is None:
         raise InputError(f"{path}: no image that OpenImageIO reads ({oiio.geterror()}); expected PNG or EXR")
     try:

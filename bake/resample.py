@@ -46,9 +46,9 @@ def source_color(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.flo
 
 
 def linear_colors(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(n, 4) uint8 sRGB with straight alpha → float32 linear RGBA in [0, 1]."""
+    """(…, 4) uint8 sRGB with straight alpha → float32 linear RGBA in [0, 1]."""
     linear = byte_to_linear()[colors]
-    linear[:, 3] = colors[:, 3] / np.float32(255.0)
+    linear[..., 3] = colors[..., 3] / np.float32(255.0)
     return linear
 
 

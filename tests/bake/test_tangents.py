@@ -1,0 +1,93 @@
+"""Tangents follow u, bitangents follow v, and every frame is a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexpara.bake.tangents import any_perpendicular, corner_angles, unit, vertex_tangents
+from flexpara.runtime.mesh import Asset, Atlas
+
+Pair = tuple[Atlas, Asset]
+
+
+def test_the_tangent_of_a_flat_quad_is_its_u_direction(quad: Pair) -> None:
+    np.testing.assert_allclose(vertex_tangents(quad[0]), np.tile([1, 0, 0, 1], (4, 1)), atol=1e-7)
+
+
+def test_turned_uv_turn_the_tangent(quad: Pair) -> None:
+    atlas, _ = quad
+    turned = np.column_stack([atlas.uv[:, 1], 1 - atlas.uv[:, 0]])
+    np.testing.assert_allclose(vertex_tangents(replace(atlas, uv=turned)), np.tile([0, 1, 0, 1], (4, 1)), atol=1e-7)
+
+
+def test_mirrored_uv_flip_the_sign(quad: Pair) -> None:
+    atlas, _ = quad
+    mirrored = np.column_stack([1 - atlas.uv[:, 0], atlas.uv[:, 1]])
+    np.testing.assert_allclose(vertex_tangents(replace(atlas, uv=mirrored)), np.tile([-1, 0, 0, -1], (4, 1)), atol=1e-7)
+
+
+def test_on_a_sphere_tangents_run_along_the_parallels(sphere: Pair) -> None:
+    atlas, _ = sphere
+    tangent = vertex_tangents(atlas)
+    x, _, z = atlas.positions.T
+    parallel = np.column_stack([z, np.zeros_like(x), -x]) / np.hypot(x, z)[:, None]
+    assert (tangent[:, 3] == 1.0).all()
+    assert np.einsum("ni,ni->n", tangent[:, :3], parallel).min() > np.cos(np.radians(10))
+    inner = np.abs(atlas.uv[:, 0] - 0.5) < 0.44  # away from the cut, where faces lie on both sides
+    assert np.einsum("ni,ni->n", tangent[inner, :3], parallel[inner]).min() > np.cos(np.radians(1.5))
+
+
+def test_frames_are_orthonormal_and_the_bitangent_runs_along_v(sphere: Pair) -> None:
+    atlas, _ = sphere
+    tangent = vertex_tangents(atlas).astype(np.float64)
+    normal = unit(atlas.normals.astype(np.float64))
+    assert np.abs(np.linalg.norm(tangent[:, :3], axis=1) - 1).max() < 1e-6
+    assert np.abs(np.einsum("ni,ni->n", tangent[:, :3], normal)).max() < 1e-6
+    assert (np.cross(normal, tangent[:, :3])[:, 1] * tangent[:, 3] > 0).all()
+
+
+def test_the_angles_of_a_flat_triangle_sum_to_pi(pair: Callable[..., Pair]) -> None:
+    atlas, _ = pair([[0, 0, 0], [3, 0, 0], [1, 2, 0]], [[0, 1, 2]], [[0, 0], [1, 0], [0, 1]])
+    normal = atlas.normals.astype(np.float64)
+    assert sum(corner_angles(atlas, normal, corner)[0] for corner in range(3)) == pytest.approx(np.pi)
+
+
+def test_weights_are_angles_so_that_cutting_a_face_in_two_changes_nothing(pair: Callable[..., Pair]) -> None:
+    def fan(angles: list[float]) -> Atlas:
+        """Faces around vertex 0 on a cone; uv sheared on the far half so that the faces disagree."""
+        turn = np.radians(angles)
+        rim = np.column_stack([np.cos(turn), np.sin(turn), np.full(len(turn), -0.5)])
+        positions = np.concatenate([np.zeros((1, 3)), rim])
+        uv = 0.5 + 0.3 * np.column_stack([positions[:, 0] + np.maximum(positions[:, 1], 0) * 0.7, positions[:, 1]])
+        faces = [[0, i, i + 1] for i in range(1, len(angles))]
+        atlas, _ = pair(positions, faces, uv)
+        normals = np.tile(np.array([0, 0, 1], np.float32), (len(positions), 1))
+        return replace(atlas, normals=normals)
+
+    coarse = vertex_tangents(fan([0, 90, 180, 270, 360]))[0]
+    bent = fan([0, 90, 180, 270, 360])
+    between = (bent.positions[1] + bent.positions[2]) / 2
+    middle_uv = (bent.uv[1] + bent.uv[2]) / 2
+    positions = np.insert(bent.positions, 2, between, axis=0)
+    fine, _ = pair(positions, [[0, i, i + 1] for i in range(1, 6)], np.insert(bent.uv, 2, middle_uv, axis=0))
+    fine = replace(fine, normals=np.tile(np.array([0, 0, 1], np.float32), (len(positions), 1)))
+    np.testing.assert_allclose(vertex_tangents(fine)[0], coarse, atol=1e-6)
+
+
+def test_faces_without_uv_area_still_give_unit_tangents(quad: Pair) -> None:
+    atlas, _ = quad
+    tangent = vertex_tangents(replace(atlas, uv=np.zeros((4, 2), np.float32)))
+    np.testing.assert_allclose(np.linalg.norm(tangent[:, :3], axis=1), 1.0, atol=1e-6)
+    np.testing.assert_allclose(tangent[:, 2], 0.0, atol=1e-6)
+    assert (tangent[:, 3] == 1.0).all()
+
+
+def test_any_perpendicular_is_perpendicular() -> None:
+    normal = unit(np.random.default_rng(0).normal(size=(100, 3)))
+    side = any_perpendicular(np.concatenate([normal, np.eye(3), -np.eye(3)]))
+    np.testing.assert_allclose(np.einsum("ni,ni->n", side[:100], normal), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(side, axis=1), 1.0, atol=1e-12)
