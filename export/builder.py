@@ -90,6 +90,7 @@ class GraphBuilder:
         try:
             checker.check_model(model, full_check=True)
         except (checker.ValidationError, shape_inference.InferenceError) as error:
-            reason = " ".join(str(error).split())
-            raise FlexparaError(f"the graph is not valid ONNX ({reason}), expected it to be; report it") from error
+            reason = " ".join(str(error).split())[:200]
+            remedy = "try ExportSpec(routed=False), and report this model"
+            raise FlexparaError(f"the graph is not valid ONNX ({reason}), expected it to be; {remedy}") from error
         return model.SerializeToString(deterministic=True)

@@ -44,7 +44,7 @@ def trace(model: nn.Module) -> fx.GraphModule:
     """
     try:
         return fx.GraphModule(model, _Flat().trace(model))
-    except (TraceError, TypeError) as error:
+    except (TraceError, TypeError, RuntimeError) as error:
         reason = str(error).splitlines()[0]
         message = f"{type(model).__name__}.forward can't be traced ({reason}), expected plain tensor operations"
         raise FlexparaError(f"{message}; remove branches and loops over points") from error
@@ -200,18 +200,23 @@ def _transpose(builder: GraphBuilder, x: Value, dim0: int, dim1: int) -> Value:
     return _permute(builder, x, *order)
 
 
-def _permute(builder: GraphBuilder, x: Value, *dims: int) -> Value:
-    return Value(builder.op("Transpose", x.name, perm=[axis % x.rank for axis in dims]), x.rank)
+def _permute(builder: GraphBuilder, x: Value, *dims: int | Sequence[int]) -> Value:
+    return Value(builder.op("Transpose", x.name, perm=[axis % x.rank for axis in _flat(dims)]), x.rank)
+
+
+def _flat(sizes: Sequence[int | Sequence[int]]) -> list[int]:
+    """Sizes or axes as torch takes them: (1, 2, 3) or ((1, 2, 3),)."""
+    return [axis for part in sizes for axis in ([part] if isinstance(part, int) else part)]
 
 
 def _unsqueeze(builder: GraphBuilder, x: Value, dim: int) -> Value:
     return Value(builder.op("Unsqueeze", x.name, builder.axes(dim)), x.rank + 1)
 
 
-def _expand(builder: GraphBuilder, x: Value, *sizes: int) -> Value:
+def _expand(builder: GraphBuilder, x: Value, *sizes: int | Sequence[int]) -> Value:
     """An axis is kept by −1 in torch, by 1 in ONNX."""
-    kept = (1 if size == -1 else size for size in sizes)
-    return Value(builder.op("Expand", x.name, builder.axes(*kept)), len(sizes))
+    kept = [1 if size == -1 else size for size in _flat(sizes)]
+    return Value(builder.op("Expand", x.name, builder.axes(*kept)), len(kept))
 
 
 def _einsum(builder: GraphBuilder, equation: str, *operands: Operand) -> Value:

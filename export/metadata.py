@@ -50,8 +50,8 @@ def bundle_metadata(frame: Frame, atlas: Atlas, charts: Charts, provenance: Prov
     if patches.ndim != 1 or len(patches) == 0 or patches.min() < 0 or patches.max() >= count:
         found = f"patch_chart of shape {patches.shape} with values {np.unique(patches)[:8].tolist()}"
         raise ShapeError(f"{found}, expected (p,) indices in [0, {count}); pack these charts and pass that atlas")
-    scale = np.float32(frame.scale)
-    if not (np.isfinite(frame.centre).all() and np.isfinite(scale) and scale > np.finfo(np.float32).tiny):
+    limits = np.finfo(np.float32)
+    if not (np.isfinite(frame.centre).all() and float(limits.tiny) < frame.scale < float(limits.max)):
         raise InputError(f"{frame}, expected finite numbers and a float32 scale above 0; rescale the surface")
     return BundleMetadata(
         chart_count=count,

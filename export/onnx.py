@@ -66,7 +66,7 @@ def export_onnx(
         model: see graph.PatchNetworks; p = len(charts.patch_chart).  Neither moved nor changed.
         frame: source units → unit ball.
         atlas: of pack(); its placement must be set, its positions serve as probes.
-        charts: patch_chart is used.
+        charts: patch_chart and face_patch are used.
         path: of the file; its folder exists.
         metadata: source hash, settings, metrics.
         spec: None = ExportSpec().
@@ -82,7 +82,7 @@ def export_onnx(
         raise MissingFileError(f"{path.parent}: no such folder, expected one to write {path.name} to; create it first")
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
     content = build_model(model, facts, spec)
-    points = probe_points(atlas, frame, max(spec.parity.sizes), spec.parity.seed)
+    points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
     report = prove_parity(UnwrapGraph(_frozen(model), facts), content, points, spec.parity)
     _write_whole(path, content)
     return report

@@ -41,24 +41,38 @@ class ParitySpec:
 
 @dataclass(frozen=True)
 class ParityReport:
-    """What the proof found.  compared: points (of all sizes together); ties: points left out; errors: max |Δ|."""
+    """What the proof found.
+
+    compared, ties: points of all sizes together, and those left out.  patches: how many of the p patches answered at
+    least once.  uv_error, score_error: max |Δ|.
+    """
 
     sizes: tuple[int, ...]
     compared: int
     ties: int
+    patches: int
     uv_error: float
     score_error: float
 
 
-def probe_points(atlas: Atlas, frame: Frame, count: int, seed: int) -> NDArray[np.float32]:
-    """(count, 3) float32, source units: three of four on the surface, every fourth anywhere in the frame's ball."""
+def probe_points(
+    atlas: Atlas, frame: Frame, face_patch: NDArray[np.int64], count: int, seed: int
+) -> NDArray[np.float32]:
+    """(count, 3) float32, source units: three of four on the surface, the others anywhere in the frame's ball.
+
+    Those on the surface visit the patches that have faces in turn, each face of a patch being as likely as the next.
+    """
     rng = np.random.default_rng(seed)
-    face = rng.integers(len(atlas.faces), size=count)
+    by_patch = np.argsort(face_patch, kind="stable")
+    _, first, faces = np.unique(face_patch[by_patch], return_index=True, return_counts=True)
+    turn = np.arange(count) % len(faces)
+    face = by_patch[first[turn] + rng.integers(faces[turn])]
     weight = rng.dirichlet(np.ones(3), size=count)
     points = np.einsum("nc,ncx->nx", weight, atlas.positions[atlas.faces[face]])
     direction = rng.normal(size=(count, 3))
     radius = np.cbrt(rng.random((count, 1))) * frame.scale / np.linalg.norm(direction, axis=1, keepdims=True)
-    points[3::4] = (np.asarray(frame.centre) + direction * radius)[3::4]
+    anywhere = rng.permutation(count) < count // 4
+    points[anywhere] = (np.asarray(frame.centre) + direction * radius)[anywhere]
     return points.astype(np.float32)
 
 
@@ -71,6 +85,7 @@ def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32]
     session = _load(content)
     compared = ties = 0
     uv_error = score_error = 0.0
+    answered: set[int] = set()
     for n in spec.sizes:
         sample = points[:n]
         uv, chart, score = _run(session, sample)
@@ -81,11 +96,12 @@ def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32]
         uv_error = max(uv_error, _difference("uv", uv, truth[0], clear, n, spec.uv_atol))
         _difference("chart", chart, truth[1], clear, n, 0.0)
         score_error = max(score_error, _difference("score", score, truth[2], clear, n, spec.score_atol))
+        answered.update(logits.argmax(dim=1)[torch.from_numpy(clear)].tolist())
         compared, ties = compared + int(clear.sum()), ties + int((~clear).sum())
     if ties > compared:
         found = f"{ties} of {compared + ties} probe points are ties between patches"
         raise ParityError(f"{found}, expected under half; train the networks")
-    return ParityReport(tuple(spec.sizes), compared, ties, uv_error, score_error)
+    return ParityReport(tuple(spec.sizes), compared, ties, len(answered), uv_error, score_error)
 
 
 def _load(content: bytes) -> onnxruntime.InferenceSession:
@@ -93,7 +109,7 @@ def _load(content: bytes) -> onnxruntime.InferenceSession:
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except (Fail, InvalidGraph, OrtNotImplemented, RuntimeException) as error:
+    except (Fail, InvalidArgument, InvalidGraph, OrtNotImplemented, RuntimeException) as error:
         reason = str(error).splitlines()[0]
         raise ParityError(f"onnxruntime can't load the graph ({reason}), expected a valid model; report it") from error
 

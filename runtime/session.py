@@ -27,7 +27,7 @@ from .bundle import METADATA_KEY, BundleMetadata
 from .errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 MAX_BYTES = 1 << 30
 CENTRES = ("centre", "centre_rest")
@@ -86,7 +86,9 @@ class UnwrapSession:
         path = Path(path)
         _check_file(path)
         _check_available(providers)
-        self._session = _load(path, providers, threads)
+        # onnxruntime reads replaced initializers from this very memory: it has to live as long as the session.
+        self._zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
+        self._session = _load(path, providers, threads, dict.fromkeys(CENTRES, self._zero))
         self._metadata = _read_metadata(self._session, path)
         _check_signature(self._session, path)
         _check_used(self._session, providers)
@@ -162,14 +164,16 @@ def _check_available(providers: Sequence[str]) -> None:
         raise MissingDependencyError(f"{found}, {expected}; install the build that has it (CUDA: onnxruntime-gpu)")
 
 
-def _load(path: Path, providers: Sequence[str], threads: int | None) -> onnxruntime.InferenceSession:
+def _load(
+    path: Path, providers: Sequence[str], threads: int | None, replaced: Mapping[str, onnxruntime.OrtValue]
+) -> onnxruntime.InferenceSession:
+    """The model with some initializers replaced; the caller keeps those alive."""
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
     if threads is not None:
         options.intra_op_num_threads = threads
-    zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
-    for name in CENTRES:
-        options.add_initializer(name, zero)
+    for name, value in replaced.items():
+        options.add_initializer(name, value)
     try:
         return onnxruntime.InferenceSession(path, options, providers=list(providers))
     except _LOAD_ERRORS as error:
