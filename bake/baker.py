@@ -90,8 +90,13 @@ def bake_map(entry: BakeMap, gbuffer: GBuffer, gutter: Gutter, atlas: Atlas, ass
     return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)
 
 
-def texture_names(textures: Mapping[str, Texture], stem: str, *, file_type: FileType | None = None) -> dict[str, str]:
-    """Map → file name `<stem>_<map>.png|exr`; file_type overrules the maps' own where they can be stored that way."""
+def texture_names(
+    textures: Mapping[str, Texture | BakeMap], stem: str, *, file_type: FileType | None = None
+) -> dict[str, str]:
+    """Map → file name `<stem>_<map>.png|exr`, known before anything is baked.
+
+    file_type overrules the maps' own where they can be stored that way.
+    """
     endings = {name: _ending(texture, file_type) for name, texture in textures.items()}
     return {name: f"{stem}_{name}.{ending}" for name, ending in endings.items()}
 
@@ -107,14 +112,11 @@ def write_textures(
     names = texture_names(textures, stem, file_type=file_type)
     paths = [folder / names[name] for name in textures]
     with ThreadPoolExecutor(WRITERS) as pool:
-        for done in [
-            pool.submit(write_texture, textures[name], path) for name, path in zip(textures, paths, strict=True)
-        ]:
-            done.result()
+        list(pool.map(write_texture, textures.values(), paths))  # list: waits, and raises what was raised
     return paths
 
 
-def _ending(texture: Texture, file_type: FileType | None) -> FileType:
+def _ending(texture: Texture | BakeMap, file_type: FileType | None) -> FileType:
     """The file type asked for, but EXR for what a PNG cannot hold."""
     if texture.encoding == "linear":
         return "exr"
