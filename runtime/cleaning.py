@@ -34,9 +34,9 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
     """
     check(raw)
     weld = weld_vertices(raw.positions)
-    welded_to = _first_of_each(weld)[weld]
+    welded_to = first_of_each(weld)[weld]
     faces = weld[raw.faces]
-    points = raw.positions[_first_of_each(weld)]
+    points = raw.positions[first_of_each(weld)]
     proper = ~degenerate_faces(points, faces)
     if not proper.any():
         raise MeshError(
@@ -74,12 +74,12 @@ def weld_vertices(positions: NDArray[np.float64]) -> NDArray[np.int64]:
             f"the bounding box has diagonal {diagonal:.3g}, expected {SMALLEST_DIAGONAL:g} to {LARGEST_DIAGONAL:g}; "
             "check the mesh and its unit"
         )
-    group = _equal_rows(positions)
-    distinct = positions[_first_of_each(group)]
+    group = equal_rows(positions)
+    distinct = positions[first_of_each(group)]
     pairs = KDTree(distinct).query_pairs(WELD_TOLERANCE * diagonal, output_type="ndarray")
     if len(pairs):
         group = connected_labels(pairs, len(distinct))[group]
-    return _by_first_appearance(group)
+    return by_first_appearance(group)
 
 
 def degenerate_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -98,9 +98,9 @@ def degenerate_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) ->
 
 def first_of_duplicates(faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(f,) bool: true for the first face of each set of corners, whatever their rotation and winding."""
-    group = _equal_rows(np.sort(faces, axis=1))
+    group = equal_rows(np.sort(faces, axis=1))
     first = np.zeros(len(faces), dtype=np.bool_)
-    first[_first_of_each(group)] = True
+    first[first_of_each(group)] = True
     return first
 
 
@@ -177,7 +177,7 @@ def _spanning_forest(edges: _FaceEdges, count: int) -> coo_matrix:
 def connected_labels(links: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """(count,) int64 component of each node, numbered by first appearance; links (m, 2) int64 joins nodes."""
     graph = coo_matrix((np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
-    return _by_first_appearance(connected_components(graph.tocsr(), directed=False)[1].astype(np.int64))
+    return by_first_appearance(connected_components(graph.tocsr(), directed=False)[1].astype(np.int64))
 
 
 def _asset(
@@ -189,12 +189,14 @@ def _asset(
     stem: str,
     sha256: str,
 ) -> Asset:
-    used = np.unique(corners)
+    in_use = np.zeros(len(raw.positions), dtype=np.bool_)
+    in_use[corners] = True
+    used = np.flatnonzero(in_use)
     renumber = np.full(len(raw.positions), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
-    new_weld = _by_first_appearance(weld[used])
+    new_weld = by_first_appearance(weld[used])
     faces, positions = renumber[corners], raw.positions[used]
-    surface = Surface(vertices=positions[_first_of_each(new_weld)], faces=new_weld[faces])
+    surface = Surface(vertices=positions[first_of_each(new_weld)], faces=new_weld[faces])
     counts = {**raw.changes, "unreferenced_vertices": len(raw.positions) - len(used), **_edge_counts(surface.faces)}
     return Asset(
         positions=positions,
@@ -219,7 +221,7 @@ def _edge_counts(faces: NDArray[np.int64]) -> dict[str, int]:
     return {"non_manifold_edges": edges.non_manifold, "components": components if components > 1 else 0}
 
 
-def _equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
+def equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
     """(n,) int64 label of each row of (n, 3), equal exactly for equal rows (-0.0 is 0.0)."""
     order = np.lexsort(rows.T)
     new = (np.diff(rows[order], axis=0) != 0).any(axis=1)
@@ -228,12 +230,12 @@ def _equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int
     return label
 
 
-def _first_of_each(label: NDArray[np.int64]) -> NDArray[np.int64]:
+def first_of_each(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k,) int64 index of the first element with each label 0 … k − 1."""
     return np.unique(label, return_index=True)[1].astype(np.int64)
 
 
-def _by_first_appearance(label: NDArray[np.int64]) -> NDArray[np.int64]:
+def by_first_appearance(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """The same classes, numbered in the order in which they first appear."""
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     rank = np.zeros(len(first), dtype=np.int64)

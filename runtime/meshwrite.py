@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cleaning import by_first_appearance, equal_rows, first_of_each
 from .errors import InputError, ShapeError
 
 if TYPE_CHECKING:
@@ -46,8 +47,9 @@ def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: N
     columns = [atlas.positions[first]]
     if colors is not None:
         columns.append(_source_colors(atlas, colors)[first, :3] / 255.0)
-    normals, normal = np.unique(atlas.normals.astype(np.float64), axis=0, return_inverse=True)
-    corners = np.stack([vertex[atlas.faces], atlas.faces, normal.reshape(-1)[atlas.faces]], axis=2) + 1
+    normal = equal_rows(atlas.normals.astype(np.float64))
+    normals = atlas.normals[first_of_each(normal)].astype(np.float64)
+    corners = np.stack([vertex[atlas.faces], atlas.faces, normal[atlas.faces]], axis=2) + 1
     head = ["# flexpara: uv are v up"]
     if texture is not None:
         head.append(f"mtllib {library.name}")
@@ -106,12 +108,10 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
 def _distinct_positions(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(m,) the first atlas vertex of each distinct position, and (n,) which of them each atlas vertex shares."""
     order = np.argsort(atlas.source_vertex, kind="stable")
-    _, first, inverse = np.unique(atlas.positions[order], axis=0, return_index=True, return_inverse=True)
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
+    label = by_first_appearance(equal_rows(atlas.positions[order]))
     vertex = np.zeros(len(order), dtype=np.int64)
-    vertex[order] = rank[inverse.reshape(-1)]
-    return order[np.sort(first)], vertex
+    vertex[order] = label
+    return order[first_of_each(label)], vertex
 
 
 def _source_colors(atlas: Atlas, colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
