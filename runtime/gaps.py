@@ -30,15 +30,35 @@ def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], 
     Returns:
         The gap in uv units; None where there is one chart only, or all outlines lie on one line.
     """
+    pairs = facing_segments(segments, chart, spacing=spacing, reach=2.0 * spacing)
+    return float(segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]).min()) if len(pairs) else None
+
+
+def facing_segments(
+    segments: NDArray[np.float64], chart: NDArray[np.int64], *, spacing: float, reach: float
+) -> NDArray[np.int64]:
+    """Pairs of segments of different charts that face each other across the gap between their charts.
+
+    Args:
+        segments: (s, 2, 2) float64 uv ends of the outline segments.
+        chart: (s,) int64 chart of each.
+        spacing: distance of the samples, uv units; grows where it would take more than 400,000 samples.
+        reach: uv units; pairs are found up to this much beyond the smallest distance.
+
+    Returns:
+        (p, 2) int64 segment indices; none where there is one chart only, or all outlines lie on one line.
+    """
     extent = np.ptp(segments.reshape(-1, 2), axis=0)
     if len(np.unique(chart)) < 2 or extent.min() <= 1e-9 * extent.max():
-        return None
+        return np.zeros((0, 2), dtype=np.int64)
     points, owner = _samples(segments, spacing)
     order = np.lexsort((chart[owner], points[:, 1], points[:, 0]))
     points, owner = points[order], owner[order]
     same = (points[1:] == points[:-1]).all(axis=1)
-    if np.any(chart[owner[1:]][same] != chart[owner[:-1]][same]):
-        return 0.0
+    touching = np.stack([owner[:-1][same], owner[1:][same]], axis=1)
+    touching = touching[chart[touching[:, 0]] != chart[touching[:, 1]]]
+    if len(touching):
+        return touching
     distinct = np.append(True, ~same)
     points, owner = points[distinct], owner[distinct]
     simplices = Delaunay(points).simplices.astype(np.int64)
@@ -46,14 +66,22 @@ def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], 
     across = chart[owner[a]] != chart[owner[b]]
     a, b = a[across], b[across]
     distance = np.linalg.norm(points[a] - points[b], axis=1)
-    near = distance <= distance.min() + 2.0 * spacing
-    return float(segment_distance(segments[owner[a[near]]], segments[owner[b[near]]]).min())
+    near = distance <= distance.min() + reach
+    return np.unique(np.sort(np.stack([owner[a[near]], owner[b[near]]], axis=1), axis=1), axis=0)
 
 
 def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) distances of segments first and second, both (n, 2, 2), that don't cross each other."""
+    """(n,) distances of segments first and second, both (n, 2, 2); 0 where they cross."""
     pairs = [(first[:, 0], second), (first[:, 1], second), (second[:, 0], first), (second[:, 1], first)]
-    return np.min([_point_distance(point, segment) for point, segment in pairs], axis=0)
+    distance = np.min([_point_distance(point, segment) for point, segment in pairs], axis=0)
+    crosses = (_sides(first, second) < 0.0) & (_sides(second, first) < 0.0)
+    return np.where(crosses, 0.0, distance)
+
+
+def _sides(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) negative where the ends of second lie on different sides of the line of first."""
+    along, offset = first[:, None, 1] - first[:, None, 0], second - first[:, None, 0]
+    return np.prod(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0], axis=1)
 
 
 def _point_distance(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Metrics of a uv layout: distortion, seams, flips, overlap, coverage, texel density, bleeding.
 
-f faces · e edges · k charts.  The surface is scaled into the unit ball (Frame: bounding-box centre, farthest vertex) and
-the uv to the same total area; mirroring a chart changes none of the distortions.  σ₁ ≥ σ₂ are the singular values of
-the affine map surface → uv of a face; 1, 1 = isometric.  Angles in radians.
+f faces · e edges · k charts.  The surface is scaled into the unit ball (Frame: bounding-box centre, farthest vertex),
+uv to the same total area; mirroring a chart changes none of the distortions.  σ₁ ≥ σ₂ are the singular values of the
+affine map surface → uv of a face; 1, 1 = isometric.  Angles in radians.
 Faces of the surface below 1e-14 area in the unit ball are left out of all means.
 """
 
