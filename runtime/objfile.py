@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLOR_COLUMNS = {6: 3, 7: 4}  # x y z r g b, and x y z w r g b: numbers in a line → first colour
+# (slashes, two in a row) of every corner of a file → which of v, vt, vn its numbers are
+UNIFORM = {(0, False): (0,), (1, False): (0, 1), (2, True): (0, 2), (2, False): (0, 1, 2)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +148,16 @@ def _corners(lines: _Lines, vertex_count: int) -> tuple[NDArray[np.int64], NDArr
 
 def _index_table(words: list[str]) -> NDArray[np.int64]:
     """'7', '7/8', '7//9' and '7/8/9' → (c, 3) int64, 0 where absent."""
-    if not any("/" in word for word in words):
-        plain = np.zeros((len(words), 3), dtype=np.int64)
-        plain[:, 0] = [int(word) for word in words]
-        return plain
-    parts = [(word + "//").split("/")[:3] for word in words]
-    return np.array([int(index or 0) for corner in parts for index in corner], dtype=np.int64).reshape(-1, 3)
+    forms = {(word.count("/"), "//" in word) for word in words}
+    columns = UNIFORM.get(next(iter(forms)), ()) if len(forms) == 1 else ()
+    if columns:
+        numbers = " ".join(words).replace("//", " ").replace("/", " ").split()
+        if len(numbers) == len(words) * len(columns):
+            table = np.zeros((len(words), 3), dtype=np.int64)
+            table[:, columns] = np.array(list(map(int, numbers)), dtype=np.int64).reshape(-1, len(columns))
+            return table
+    flat = (index for word in words for index in (word + "//").split("/")[:3])
+    return np.array([int(index or 0) for index in flat], dtype=np.int64).reshape(-1, 3)
 
 
 def _fans(size: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -141,3 +141,18 @@ def test_damage_is_named_in_one_line(text: str, message: str) -> None:
     with pytest.raises(MeshError, match=message) as caught:
         read(text, files.get)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("face", ["f 1/ 2/ 3/", "f 1// 2// 3//", "f 1 2/ 3//"])
+def test_empty_places_behind_slashes_mean_absent(face: str) -> None:
+    raw = read(f"{SQUARE}vt 0 0\nvn 0 0 1\n{face}\n")
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
+    assert (raw.uv, raw.normals) == (None, None)
+
+
+def test_mixed_corners_read_like_uniform_ones() -> None:
+    head = f"{SQUARE}vt 0 0\nvt 1 1\nvn 0 0 1\nvn 1 0 0\n"
+    mixed = read(head + "f 1/1/1 2/2/2 3/1/1\nf 1//1 3//2 4//1\n")
+    assert mixed.normals is not None
+    np.testing.assert_array_equal(mixed.normals[mixed.faces][:, :, 0], [[0, 1, 0], [0, 1, 0]])
+    assert mixed.changes == {"faces_without_uv": 1}
