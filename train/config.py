@@ -76,8 +76,18 @@ class ContactConfig:
     """Rounds of pinning, SLIM and the exact test."""
     iterations: int = 2
     """SLIM iterations a round."""
-    block: int = 3
+    block: int = 10
+    """SLIM iterations between two looks at the energy."""
+    blocks: int = 6
+    """Blocks at most."""
+    still: float = 0.05
+    """A block that lowers the energy by less than this share ends the run."""
+    hope: float = 0.3
+    """Share of the way to its goal that the first block must make."""
+    step: int = 3
     """SLIM iterations between two tests where contacts are needed."""
+    steps: int = 5
+    """Such steps at most."""
     margin: float = 0.01
     """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
     weight: float = 10.0
@@ -96,8 +106,8 @@ class ReliefConfig:
     """Neighbourhood over which stress is averaged."""
     shortest: float = 0.1
     """Slits shorter than this are judged as if they had this length."""
-    iterations: int = 10
-    """SLIM iterations after each slit."""
+    near: float = 0.03
+    """No slit aims at a vertex closer to the border than this."""
     failures: int = 3
     """Slits that may fail to pay before a chart is left as it is."""
     most: int = 12
@@ -114,20 +124,50 @@ class FinishConfig:
 
     labels: LabelConfig = field(default_factory=LabelConfig)
     relief: ReliefConfig = field(default_factory=ReliefConfig)
-    surrogate_faces: int = 6000
+    surrogate_faces: int = 3000
     """Faces of the simplified surface on which charts are split and merged."""
-    trial_iterations: int = 10
-    """SLIM iterations of a flattening that is only weighed."""
     rounds: int = 8
     """Times the worst chart may be split."""
     necks: int = 2
     """Borders tried for each split and seed."""
-    polish_iterations: int = 10
-    """SLIM iterations a polishing round."""
-    polish_rounds: int = 3
-    """Polishing rounds a chart gets while each lowers its energy by ``polish_gain``."""
-    polish_gain: float = 0.03
-    """Share of a chart's excess energy that a polishing round has to save for another to follow."""
+
+
+@dataclass(frozen=True)
+class PatchConfig:
+    """Dividing charts into patches that one smooth network can answer for."""
+
+    neighbours: int = 24
+    """Nearest faces looked at from each face."""
+    reach: float = 0.08
+    """Greatest distance at which two faces are close."""
+    stretch: float = 2.0
+    """uv distance per distance in space that counts as smooth."""
+    gap: float = 0.03
+    """uv distance beyond that which counts as a tear."""
+    most: int = 8
+    """Patches a chart may have."""
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """Fitting the deployed networks to the finished charts."""
+
+    samples: int = 60000
+    """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
+    unwrap_steps: int = 500
+    """Optimizer steps of the Unwrap-Nets."""
+    unwrap_batch: int = 256
+    """Samples a step and patch."""
+    assign_steps: int = 600
+    """Optimizer steps of the Assign-Net."""
+    assign_batch: int = 2048
+    """Samples a step."""
+    seam_share: float = 0.6
+    """Share of the Assign-Net's samples that lie close to seams."""
+    seam_reach: float = 0.02
+    """Standard deviation of their distance from the seam."""
+    rate: float = 5e-3
+    """Peak learning rate."""
 
 
 @dataclass(frozen=True)
@@ -142,3 +182,5 @@ class TrainConfig:
     start: StartConfig = field(default_factory=StartConfig)
     joint: JointConfig = field(default_factory=JointConfig)
     finish: FinishConfig = field(default_factory=FinishConfig)
+    patch: PatchConfig = field(default_factory=PatchConfig)
+    fit: FitConfig = field(default_factory=FitConfig)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..runtime.overlap import overlapping_pairs
 from ..runtime.topology import edge_table
-from .flatten import Pins, slim
+from .flatten import Pins, Slim, jacobians, slim, symmetric_dirichlet
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -99,9 +99,7 @@ def rim_overlaps(faces: NDArray[np.int64], edges: NDArray[np.int64], uv: NDArray
     return len(overlapping_pairs(uv[rim])) > 0
 
 
-def separate(
-    surface: Surface, start: Relaxed, edges: NDArray[np.int64], config: ContactConfig
-) -> Relaxed | None:
+def separate(surface: Surface, start: Relaxed, edges: NDArray[np.int64], config: ContactConfig) -> Relaxed | None:
     """``start`` with its overlaps taken apart; None where ``config.rounds`` did not suffice."""
     margin = config.margin * float(np.sqrt(surface.face_areas().sum()))
     uv, places = start.uv, dict(start.pins)
@@ -117,18 +115,45 @@ def separate(
     return None if rim_overlaps(surface.faces, edges, uv) else Relaxed(uv, places)
 
 
-def relax(surface: Surface, start: Relaxed, iterations: int, config: ContactConfig) -> Relaxed:
-    """SLIM from a valid flattening to a valid one: freely first, and where that overlaps, in small steps with contacts.
+def excess_energy(surface: Surface, uv: NDArray[np.float64]) -> float:
+    """Σ area · (symmetric Dirichlet − 1), each face capped at 10 so that one sliver decides nothing; source units squared."""
+    return float(surface.face_areas() @ np.minimum(symmetric_dirichlet(jacobians(surface, uv)) - 1.0, 10.0))
 
-    Stops early at the last valid state when contacts can't hold the pieces apart; with ``config.rounds`` = 0 there are none.
+
+def converge(surface: Surface, start: Relaxed, goal: float, config: ContactConfig) -> NDArray[np.float64] | None:
+    """Uv (v, 2) after SLIM until it hardly moves; None as soon as ``goal`` is out of sight.
+
+    A slit swings through overlap while it opens, so only the end is worth an overlap test.  Out of sight: the first block
+    of iterations made less than ``config.hope`` of the way from the start's energy to the goal.
+    """
+    solver = Slim(surface, start.uv, as_pins(start.pins, config.weight))
+    first = energy = excess_energy(surface, start.uv)
+    uv = start.uv
+    for _ in range(config.blocks):
+        uv = solver.run(config.block)
+        previous, energy = energy, excess_energy(surface, uv)
+        if first - energy < config.hope * (first - goal):
+            return None
+        if previous - energy < config.still * previous:
+            break
+    return uv
+
+
+def relax(surface: Surface, start: Relaxed, config: ContactConfig, *, goal: float = np.inf) -> Relaxed:
+    """SLIM from a valid flattening to a valid one: freely first, and where that ends in overlap, in small steps with contacts.
+
+    Returns the start where ``goal`` (excess energy) is out of sight, and the last valid state where contacts can't hold the
+    chart apart; with ``config.rounds`` = 0 there are no contacts.
     """
     edges = boundary_edges(surface.faces)
-    free = slim(surface, start.uv, iterations, as_pins(start.pins, config.weight))
+    free = converge(surface, start, goal, config)
+    if free is None:
+        return start
     if not rim_overlaps(surface.faces, edges, free):
         return Relaxed(free, start.pins)
     state = start
-    for _ in range(0, iterations if config.rounds else 0, config.block):
-        moved = slim(surface, state.uv, config.block, as_pins(state.pins, config.weight))
+    for _ in range(config.steps if config.rounds else 0):
+        moved = slim(surface, state.uv, config.step, as_pins(state.pins, config.weight))
         apart = separate(surface, Relaxed(moved, state.pins), edges, config)
         if apart is None:
             break

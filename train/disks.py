@@ -127,7 +127,9 @@ def prune(table: EdgeTable, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
         cut &= ~dead
 
 
-def cut_open(faces: NDArray[np.int64], cut: NDArray[np.bool_], table: EdgeTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cut_open(
+    faces: NDArray[np.int64], cut: NDArray[np.bool_], table: EdgeTable
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Faces (f, 3) over the vertices of the opened piece, and the old vertex (v',) of each."""
     return split_non_manifold_vertices(faces, cut, table)
 

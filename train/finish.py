@@ -1,6 +1,6 @@
 """Finishing: from chart probabilities to valid charts.   f faces · unit ball.
 
-labels (α-expansion) → split and merge on a simplified twin → labels carried back → valid pieces → slits → polish → exact check.
+labels (α-expansion) → split and merge on a simplified twin → labels and slits carried back → exact check.
 Valid means: each chart a flattened disk (holes allowed), no flipped triangle, no overlap, by exact tests.
 """
 
@@ -15,7 +15,7 @@ from ..runtime.errors import FinishError
 from ..runtime.overlap import flipped_triangles, overlapping_pairs
 from ..runtime.topology import edge_table
 from .labels import connected_pieces, dual_graph, merge_pieces, smooth_labels
-from .pieces import Piece, polished
+from .pieces import Piece
 from .regroup import Regrouping
 from .surrogate import carry_labels, simplified
 
@@ -60,10 +60,7 @@ def finish(
     if coarse is not surface:
         stage("carry labels back")
         search = carried_back(surface, coarse, search, charts, config)
-    stage("slit and polish")
-    area = float(surface.face_areas().sum())
-    pieces = [polished(search.relieve(piece, contacts=True), area, config) for piece in search.pieces.values()]
-    pieces.sort(key=lambda piece: int(piece.ids.min()))
+    pieces = sorted(search.pieces.values(), key=lambda piece: int(piece.ids.min()))
     stage("exact check")
     verify(pieces)
     return Finished(pieces, search.objective())
@@ -76,23 +73,28 @@ def regrouped(surface: Surface, log_probability: LogProbability, charts: int, co
     unlikely = -log_probability(surface.triangles.mean(axis=1))
     label = smooth_labels(unlikely * areas[:, None] / config.labels.smoothing, graph)
     pieces = merge_pieces(label, areas, graph, len(label), config.labels)
-    search = Regrouping(surface, graph, pieces, config)
+    search = Regrouping(surface, graph, config)
+    for number in range(int(pieces.max()) + 1):
+        search.add_valid(np.flatnonzero(pieces == number))
+    search.relieve_all()
     search.search(charts + component_count(graph, len(label)) - 1)
     return search
 
 
-def carried_back(
-    surface: Surface, coarse: Surface, found: Regrouping, charts: int, config: FinishConfig
-) -> Regrouping:
-    """The pieces found on the coarse twin, on the surface itself; merged again where validity asked for more pieces."""
-    label = np.unique(found.label(), return_inverse=True)[1]
-    votes = carry_labels(coarse, label, surface)
+def carried_back(surface: Surface, coarse: Surface, found: Regrouping, charts: int, config: FinishConfig) -> Regrouping:
+    """The pieces and slits found on the coarse twin, on the surface itself; merged where validity asked for more pieces."""
+    keys, label = np.unique(found.label(), return_inverse=True)
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.crease_discount)
     areas = surface.face_areas()
-    unlikely = -np.log(np.maximum(votes, 1e-3))
-    limit = charts + component_count(graph, len(areas)) - 1
+    unlikely = -np.log(np.maximum(carry_labels(coarse, label, surface), 1e-3))
     smooth = smooth_labels(unlikely * areas[:, None] / config.labels.smoothing, graph)
-    search = Regrouping(surface, graph, merge_pieces(smooth, areas, graph, limit, config.labels), replace(config, rounds=0))
+    limit = charts + component_count(graph, len(areas)) - 1
+    piece = merge_pieces(smooth, areas, graph, limit, config.labels)
+    search = Regrouping(surface, graph, replace(config, rounds=0))
+    for number in range(int(piece.max()) + 1):
+        ids = np.flatnonzero(piece == number)
+        source = keys[np.bincount(smooth[ids]).argmax()]
+        search.add_valid(ids, found.pieces[int(source)].targets)
     search.search(limit)
     return search
 

@@ -74,7 +74,9 @@ def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.fl
     count = len(surface.vertices)
     a = surface.faces.reshape(-1)
     b = np.roll(surface.faces, -1, axis=1).reshape(-1)
-    links = sparse.coo_array((np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(count, count))
+    links = sparse.coo_array(
+        (np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(count, count)
+    )
     links = links.tocsr()
     links.data[:] = 1.0
     laplacian = sparse.diags_array(links.sum(axis=1)) - links
@@ -104,12 +106,12 @@ class Slim:
         )
 
     def run(self, iterations: int) -> NDArray[np.float64]:
-        """uv (v, 2) after so many more iterations."""
+        """Uv (v, 2) after so many more iterations."""
         return np.ascontiguousarray(igl.slim_solve(self._data, iterations))
 
 
 def slim(surface: Surface, uv: NDArray[np.float64], iterations: int, pins: Pins | None = None) -> NDArray[np.float64]:
-    """uv (v, 2) after ``iterations`` of SLIM from the flip-free ``uv``, at the scale of the surface."""
+    """Uv (v, 2) after ``iterations`` of SLIM from the flip-free ``uv``, at the scale of the surface."""
     return Slim(surface, uv, pins).run(iterations)
 
 
@@ -138,7 +140,7 @@ def sorted_loops(surface: Surface) -> list[NDArray[np.int64]]:
 
 
 def flatten(surface: Surface, iterations: int) -> NDArray[np.float64]:
-    """uv (v, 2) of a piece of disk topology, holes allowed: they are filled while SLIM runs, so they stay open and simple."""
+    """Uv (v, 2) of a piece of disk topology, holes allowed: they are filled while SLIM runs, so they stay open and simple."""
     outer, *holes = sorted_loops(surface)
     filled = fill_holes(surface, holes)
     uv = slim(filled, circle_map(filled, outer), iterations)

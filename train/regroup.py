@@ -13,9 +13,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from .flatten import jacobians, symmetric_dirichlet
 from .labels import DualGraph, border_lengths
 from .pieces import Piece, make_piece, relieved
-from .relief import excess
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,10 +24,13 @@ if TYPE_CHECKING:
     from .config import FinishConfig
 
 
+Targets = tuple["NDArray[np.float64]", ...]
+
+
 class Regrouping:
     """The search's state: pieces of a surface, and the merges already weighed."""
 
-    def __init__(self, surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> None:
+    def __init__(self, surface: Surface, graph: DualGraph, config: FinishConfig) -> None:
         self.surface, self.graph, self.config = surface, graph, config
         self.areas = surface.face_areas()
         self.area = float(self.areas.sum())
@@ -37,8 +40,6 @@ class Regrouping:
         self.pieces: dict[int, Piece] = {}
         self.merges: dict[tuple[int, int], Piece | None] = {}
         self._next = 0
-        for value in range(int(label.max()) + 1):
-            self.add_valid(np.flatnonzero(label == value))
 
     def add(self, piece: Piece) -> int:
         """Take a piece in; its key."""
@@ -46,23 +47,25 @@ class Regrouping:
         self._next += 1
         return self._next - 1
 
-    def add_valid(self, ids: NDArray[np.int64]) -> None:
-        """Faces as one valid piece, or halved until they are."""
-        piece = self.weigh(ids)
+    def add_valid(self, ids: NDArray[np.int64], targets: Targets = ()) -> None:
+        """Faces as one valid piece, slit to the targets, or halved until they are valid."""
+        piece = self.weigh(ids, targets) or (self.weigh(ids) if targets else None)
         if piece is not None:
-            self.add(self.relieve(piece))
+            self.add(piece)
             return
         for half in halves(ids, self.graph, self.centroids, self.farthest(ids)):
             self.add_valid(half)
 
-    def weigh(self, ids: NDArray[np.int64]) -> Piece | None:
-        """A plain flattening of the faces."""
-        return make_piece(self.surface, ids, self.area, self.config)
+    def weigh(self, ids: NDArray[np.int64], targets: Targets = ()) -> Piece | None:
+        """A flattening of the faces, with no slits but those to the targets."""
+        return make_piece(self.surface, ids, self.area, self.config, targets)
+
+    def relieve_all(self) -> None:
+        """Slits where they pay, in all pieces."""
+        self.pieces = {key: self.relieve(piece) for key, piece in self.pieces.items()}
 
     def relieve(self, piece: Piece, *, contacts: bool = False) -> Piece:
         """Slit where it pays.  ``contacts``: hold slits apart that would overlap (slow), else leave such slits out."""
-        if piece.relieved and not contacts:
-            return piece
         relief = self.config.relief
         if not contacts:
             relief = replace(relief, contact=replace(relief.contact, rounds=0))
@@ -119,7 +122,7 @@ class Regrouping:
     def best_split(self, key: int) -> tuple[float, list[Piece]] | None:
         """The best way found to halve a piece: (gain, parts)."""
         piece, price = self.pieces[key], self.config.relief.price
-        load = piece.flat.surface.face_areas() * excess(piece.flat)
+        load = symmetric_dirichlet(jacobians(piece.flat.surface, piece.flat.uv)) * piece.flat.surface.face_areas()
         best = None
         for seed in {int(piece.ids[load.argmax()]), self.farthest(piece.ids)}:
             for parts_ids in necks(piece.ids, self.graph, self.centroids, self.areas, seed, self.config.necks):
@@ -225,9 +228,7 @@ def dual_distance(
     return dijkstra(links, directed=False, indices=int(np.flatnonzero(ids == seed)[0]))
 
 
-def connected_parts(
-    ids: NDArray[np.int64], near: NDArray[np.bool_], graph: DualGraph
-) -> list[NDArray[np.int64]]:
+def connected_parts(ids: NDArray[np.int64], near: NDArray[np.bool_], graph: DualGraph) -> list[NDArray[np.int64]]:
     """The connected parts of ids when the dual edges between near and far are cut."""
     i, j, _ = inner_pairs(ids, graph, int(max(graph.pairs.max(), ids.max())) + 1)
     same = near[i] == near[j]
@@ -236,9 +237,7 @@ def connected_parts(
     return [ids[part == number] for number in range(count)]
 
 
-def neck_length(
-    first: NDArray[np.int64], others: list[NDArray[np.int64]], graph: DualGraph, count: int
-) -> float:
+def neck_length(first: NDArray[np.int64], others: list[NDArray[np.int64]], graph: DualGraph, count: int) -> float:
     """Length of the border between one part and the others."""
     side = np.zeros(count, dtype=np.int8)
     side[first] = 1

@@ -13,8 +13,8 @@ from scipy import sparse
 
 from ..runtime.mesh import Surface
 from ..runtime.topology import EdgeTable, edge_table
-from .contact import Relaxed, relax
-from .disks import cut_open, edge_costs, path_mask, shortest_paths, trace_back
+from .contact import Relaxed, excess_energy, relax
+from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
 from .flatten import jacobians, symmetric_dirichlet
 
 if TYPE_CHECKING:
@@ -30,15 +30,10 @@ class Flat(NamedTuple):
     uv: NDArray[np.float64]
     pins: dict[int, NDArray[np.float64]]
 
-    def relaxed(self, iterations: int, config: ContactConfig) -> Flat:
-        """The piece after so many SLIM iterations, still valid."""
-        state = relax(self.surface, Relaxed(self.uv, self.pins), iterations, config)
+    def relaxed(self, config: ContactConfig, *, goal: float = np.inf) -> Flat:
+        """The piece after SLIM, still valid; unchanged where the goal (excess energy, source units squared) is out of sight."""
+        state = relax(self.surface, Relaxed(self.uv, self.pins), config, goal=goal)
         return self._replace(uv=state.uv, pins=state.pins)
-
-
-def excess(flat: Flat) -> NDArray[np.float64]:
-    """(f,) symmetric Dirichlet energy above isometry, capped at 10 so that one sliver decides nothing."""
-    return np.minimum(symmetric_dirichlet(jacobians(flat.surface, flat.uv)) - 1.0, 10.0)
 
 
 def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
@@ -49,12 +44,15 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
     faces, count = flat.surface.faces, len(flat.surface.vertices)
     areas = flat.surface.face_areas()
     mass = np.bincount(faces.reshape(-1), np.repeat(areas, 3), minlength=count)
+    energy = np.minimum(symmetric_dirichlet(jacobians(flat.surface, flat.uv)) - 1.0, 10.0)
     squeezed = np.linalg.det(jacobians(flat.surface, flat.uv)) < 1.0
-    load = np.bincount(faces.reshape(-1), np.repeat(areas * excess(flat) * squeezed, 3), minlength=count)
+    load = np.bincount(faces.reshape(-1), np.repeat(areas * energy * squeezed, 3), minlength=count)
     ends = flat.surface.vertices[table.edges]
     spacing = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
     i, j = table.edges.T
-    links = sparse.coo_array((np.ones(2 * len(i)), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(count, count))
+    links = sparse.coo_array(
+        (np.ones(2 * len(i)), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(count, count)
+    )
     links = (links + sparse.eye_array(count)).tocsr()
     links = sparse.diags_array(1.0 / links.sum(axis=0)) @ links  # columns pass on all they have
     for _ in range(int(np.clip((radius / spacing) ** 2, 1, 60))):
@@ -62,49 +60,75 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
     return load / np.maximum(mass, 1e-300)
 
 
-def slit(flat: Flat, spared: list[NDArray[np.float64]], unit: float, config: ReliefConfig) -> tuple[Flat, float, int] | None:
-    """The piece slit from its boundary to its most stressed vertex: (piece, length / unit, that vertex), or None.
+def slit_to(flat: Flat, target: int, paths: ShortestPaths, table: EdgeTable) -> Flat:
+    """The piece slit along the path tree from its boundary to a vertex; both sides keep their uv."""
+    cut = path_mask(table, [trace_back(paths.parent, target)])
+    faces, old = cut_open(flat.surface.faces, cut, table)
+    pins = {new: flat.pins[vertex] for new, vertex in enumerate(old.tolist()) if vertex in flat.pins}
+    return Flat(Surface(flat.surface.vertices[old], faces), flat.uv[old], pins)
+
+
+def border_paths(surface: Surface, table: EdgeTable, config: ReliefConfig) -> ShortestPaths:
+    """Cheapest ways from the boundary to each vertex."""
+    boundary = np.unique(table.edges[table.edge_count == 1])
+    cost = edge_costs(surface, table, config.crease_discount)
+    return shortest_paths(len(surface.vertices), table.edges, cost, boundary)
+
+
+def next_slit(
+    flat: Flat, spared: list[NDArray[np.float64]], unit: float, config: ReliefConfig
+) -> tuple[Flat, float, NDArray[np.float64]] | None:
+    """The piece slit to its most stressed vertex: (piece, length / unit, that vertex's position), or None.
 
     ``spared``: points around which (2 · config.radius · unit) no slit is tried.
     """
     surface = flat.surface
     table = edge_table(surface.faces)
-    boundary = np.unique(table.edges[table.edge_count == 1])
+    paths = border_paths(surface, table, config)
     pressure = stress(flat, table, config.radius * unit)
-    pressure[boundary] = 0.0
+    pressure[~(paths.distance >= config.near * unit)] = 0.0
     for point in spared:
         pressure[np.linalg.norm(surface.vertices - point, axis=1) < 2.0 * config.radius * unit] = 0.0
     target = int(pressure.argmax())
     if pressure[target] <= 0.0:
         return None
-    cost = edge_costs(surface, table, config.crease_discount)
-    path = trace_back(shortest_paths(len(surface.vertices), table.edges, cost, boundary).parent, target)
-    points = surface.vertices[path]
+    points = surface.vertices[trace_back(paths.parent, target)]
     length = float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum()) / unit
-    faces, old = cut_open(surface.faces, path_mask(table, [path]), table)
-    pins = {new: flat.pins[vertex] for new, vertex in enumerate(old.tolist()) if vertex in flat.pins}
-    return Flat(Surface(surface.vertices[old], faces), flat.uv[old], pins), length, target
+    return slit_to(flat, target, paths, table), length, surface.vertices[target]
 
 
-def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> Flat:
-    """The piece with every slit that pays: each lowers the excess by more than ``config.price`` times its length.
+def slit_along(surface: Surface, targets: list[NDArray[np.float64]], config: ReliefConfig) -> Surface:
+    """The piece slit to the vertices nearest to the targets, in their order; targets on its border ask for nothing."""
+    flat = Flat(surface, np.zeros((len(surface.vertices), 2)), {})
+    for target in targets:
+        table = edge_table(flat.surface.faces)
+        paths = border_paths(flat.surface, table, config)
+        nearest = int(np.linalg.norm(flat.surface.vertices - target, axis=1).argmin())
+        flat = slit_to(flat, nearest, paths, table)
+    return flat.surface
 
-    Greedy: slit to the most stressed vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
+
+def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, list[NDArray[np.float64]]]:
+    """The piece with every slit that pays, and the points they lead to.
+
+    A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most stressed
+    vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
     """
     unit = float(np.sqrt(total_area))
     spared: list[NDArray[np.float64]] = []
-    cuts = 0
-    energy = float(flat.surface.face_areas() @ excess(flat)) / total_area
-    while len(spared) < config.failures and cuts < config.most and energy > config.price * config.shortest:
-        found = slit(flat, spared, unit, config)
+    targets: list[NDArray[np.float64]] = []
+    energy = excess_energy(flat.surface, flat.uv) / total_area
+    while len(spared) < config.failures and len(targets) < config.most and energy > config.price * config.shortest:
+        found = next_slit(flat, spared, unit, config)
         if found is None:
             break
-        trial, length, target = found
-        point = flat.surface.vertices[target]
-        trial = trial.relaxed(config.iterations, config.contact)
-        lowered = float(trial.surface.face_areas() @ excess(trial)) / total_area
-        if energy - lowered > config.price * max(length, config.shortest):
-            flat, energy, cuts = trial, lowered, cuts + 1
+        trial, length, point = found
+        needed = energy - config.price * max(length, config.shortest)
+        trial = trial.relaxed(config.contact, goal=needed * total_area)
+        lowered = excess_energy(trial.surface, trial.uv) / total_area
+        if lowered < needed:
+            flat, energy = trial, lowered
+            targets.append(point)
         else:
             spared.append(point)
-    return flat
+    return flat, targets

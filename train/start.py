@@ -44,7 +44,7 @@ def cluster(
 def plane_projection(
     xyz: NDArray[np.float64], normal: NDArray[np.float64], label: NDArray[np.int64], count: int
 ) -> NDArray[np.float64]:
-    """uv (count, n, 2): each point projected onto the plane of each cluster, seen from outside (mean normal towards the eye).
+    """Uv (count, n, 2): each point projected onto the plane of each cluster, seen from outside (mean normal towards the eye).
 
     The axes are the cluster's principal directions within its plane; the origin is its mean.
     """

@@ -1,6 +1,6 @@
 """A simplified twin of a surface for decisions that need no detail, and the way of its labels back.
 
-Splitting and merging weighs dozens of flattenings; on 6,000 faces each takes hundredths of a second whatever the mesh.
+Splitting and merging weighs dozens of flattenings; on a few thousand faces each takes hundredths of a second whatever the mesh.
 """
 
 from __future__ import annotations

@@ -1,0 +1,161 @@
+"""Networks fitted to finished charts, so that they answer for any surface point what the atlas says.   unit ball.
+
+n samples · p patches.  Two regressions: uv by the Unwrap-Nets, each on its own patch; the patch by the Assign-Net.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from .joint import one_cycle
+from .networks import AtlasNetworks
+from .sampling import sample_surface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ..runtime.mesh import Charts, Surface
+    from .config import FitConfig, NetConfig
+
+    Report = Callable[[int, float], None]
+
+
+class PatchSamples(NamedTuple):
+    """The same number of samples on each patch.  xyz (p, m, 3), uv (p, m, 2) float32, uv centred and scaled per patch.
+
+    centre (p, 1, 2) and scale (p, 1, 1) bring them back: uv_chart = uv · scale + centre.
+    """
+
+    xyz: Tensor
+    uv: Tensor
+    centre: Tensor
+    scale: Tensor
+
+
+def sample_patches(surface: Surface, charts: Charts, per_patch: int, rng: np.random.Generator) -> PatchSamples:
+    """``per_patch`` area-weighted samples of each patch with their chart uv."""
+    xyz, uv = [], []
+    for patch in range(len(charts.patch_chart)):
+        ids = np.flatnonzero(charts.face_patch == patch)
+        samples = sample_surface(type(surface)(surface.vertices, surface.faces[ids]), per_patch, rng)
+        xyz.append(samples.xyz)
+        uv.append(np.einsum("nc,ncd->nd", samples.barycentric, charts.corner_uv[ids[samples.face]]))
+    flat = np.stack(uv)
+    centre = flat.mean(axis=1, keepdims=True)
+    scale = np.abs(flat - centre).max(axis=(1, 2), keepdims=True) + 1e-12
+    arrays = np.stack(xyz), (flat - centre) / scale, centre, scale
+    return PatchSamples(*(torch.from_numpy(a.astype(np.float32)) for a in arrays))
+
+
+def fit_unwrap(
+    networks: AtlasNetworks, samples: PatchSamples, config: FitConfig, generator: torch.Generator, report: Report
+) -> None:
+    """Least squares on uv; the last layers are solved for exactly at the end, and take the chart's own units."""
+    patches, count = samples.xyz.shape[:2]
+    optimizer, schedule = one_cycle(networks.unwrap, config.unwrap_steps, config.rate)
+    rows = torch.arange(patches)[:, None]
+    for step in range(config.unwrap_steps):
+        pick = torch.randint(count, (patches, config.unwrap_batch), generator=generator)
+        flat = networks.unwrap(networks.unwrap_features(samples.xyz[rows, pick]))
+        loss = ((flat - samples.uv[rows, pick]) ** 2).mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+        if step % 25 == 0:
+            report(step, loss.item())
+    solve_last_layer(networks, samples)
+
+
+@torch.no_grad()
+def solve_last_layer(networks: AtlasNetworks, samples: PatchSamples) -> None:
+    """Ridge regression of uv (chart units) on the last hidden layer: the best last layer for the features found."""
+    hidden = networks.unwrap_features(samples.xyz)
+    for layer in networks.unwrap.layers[:-1]:
+        hidden = nn.functional.silu(layer(hidden))
+    hidden = hidden.double()
+    design = torch.cat([hidden, torch.ones_like(hidden[..., :1])], dim=-1)
+    gram = design.mT @ design
+    ridge = (
+        1e-9 * gram.diagonal(dim1=-2, dim2=-1).mean(dim=-1)[:, None, None] * torch.eye(gram.shape[-1], dtype=gram.dtype)
+    )
+    target = (samples.uv * samples.scale + samples.centre).double()
+    solution = torch.linalg.solve(gram + ridge, design.mT @ target)
+    last = networks.unwrap.layers[-1]
+    last.weight.copy_(solution[:, :-1])
+    last.bias.copy_(solution[:, -1:])
+
+
+def sample_seams(
+    surface: Surface, charts: Charts, count: int, reach: float, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points (count, 3) beside chart borders, at normally distributed distances, and their faces (count,)."""
+    half = seam_halfedges(surface, charts)
+    face, corner = half // 3, half % 3
+    corners = surface.triangles[face]
+    row = np.arange(len(half))
+    a, b, c = (corners[row, (corner + i) % 3] for i in range(3))
+    length = np.linalg.norm(b - a, axis=1)
+    height = 2.0 * surface.face_areas()[face] / np.maximum(length, 1e-300)
+    cumulative = np.cumsum(length)
+    pick = np.searchsorted(cumulative, rng.random(count) * cumulative[-1]).clip(max=len(half) - 1)
+    depth = np.minimum(np.abs(rng.normal(size=count)) * reach / np.maximum(height[pick], 1e-300), 1.0)[:, None]
+    along = rng.random(count)[:, None]
+    points = (a[pick] * (1.0 - along) + b[pick] * along) * (1.0 - depth) + c[pick] * depth
+    return points, face[pick]
+
+
+def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:
+    """Half-edges 3·face + corner along borders between two charts."""
+    from ..runtime.topology import edge_table
+
+    table = edge_table(surface.faces)
+    inside = table.edge_count >= 2
+    faces = table.edge_faces[inside]
+    apart = charts.face_chart[faces[:, 0]] != charts.face_chart[faces[:, 1]]
+    return table.edge_halfedges[inside][apart].reshape(-1)
+
+
+def fit_assign(
+    networks: AtlasNetworks,
+    surface: Surface,
+    charts: Charts,
+    config: FitConfig,
+    generators: tuple[np.random.Generator, torch.Generator],
+    report: Report,
+) -> None:
+    """Cross-entropy on the patch, most samples close to the seams."""
+    rng, generator = generators
+    uniform = sample_surface(surface, int(config.samples * (1.0 - config.seam_share)), rng)
+    near, near_face = sample_seams(surface, charts, int(config.samples * config.seam_share), config.seam_reach, rng)
+    xyz = torch.from_numpy(np.concatenate([uniform.xyz, near]).astype(np.float32))
+    label = torch.from_numpy(charts.face_patch[np.concatenate([uniform.face, near_face])])
+    optimizer, schedule = one_cycle(networks.assign, config.assign_steps, config.rate)
+    for step in range(config.assign_steps):
+        pick = torch.randint(len(xyz), (config.assign_batch,), generator=generator)
+        loss = nn.functional.cross_entropy(networks.scores(xyz[pick]), label[pick])
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+        if step % 25 == 0:
+            report(step, loss.item())
+
+
+def fit_networks(
+    surface: Surface, charts: Charts, net: NetConfig, config: FitConfig, seed: int, report: Report
+) -> AtlasNetworks:
+    """Assign- and Unwrap-Nets for finished charts of a surface in the unit ball; charts' uv in the same units."""
+    rng, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
+    patches = len(charts.patch_chart)
+    networks = AtlasNetworks(patches, net, generator=generator)
+    samples = sample_patches(surface, charts, max(config.samples // patches, 500), rng)
+    fit_unwrap(networks, samples, config, generator, report)
+    fit_assign(networks, surface, charts, config, (rng, generator), report)
+    return networks.eval()
