@@ -11,19 +11,17 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from ..runtime.topology import edge_table
 from .joint import one_cycle
 from .networks import AtlasNetworks
 from .sampling import sample_surface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Charts, Surface
     from .config import FitConfig, NetConfig
-
-    Report = Callable[[int, float], None]
+    from .pipeline import Progress
 
 
 class PatchSamples(NamedTuple):
@@ -54,7 +52,7 @@ def sample_patches(surface: Surface, charts: Charts, per_patch: int, rng: np.ran
 
 
 def fit_unwrap(
-    networks: AtlasNetworks, samples: PatchSamples, config: FitConfig, generator: torch.Generator, report: Report
+    networks: AtlasNetworks, samples: PatchSamples, config: FitConfig, generator: torch.Generator, progress: Progress
 ) -> None:
     """Least squares on uv; the last layers are solved for exactly at the end, and take the chart's own units."""
     patches, count = samples.xyz.shape[:2]
@@ -69,7 +67,7 @@ def fit_unwrap(
         optimizer.step()
         schedule.step()
         if step % 25 == 0:
-            report(step, loss.item())
+            progress("fit uv", step, config.unwrap_steps, loss.item())
     solve_last_layer(networks, samples)
 
 
@@ -112,14 +110,15 @@ def sample_seams(
 
 
 def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:
-    """Half-edges 3·face + corner along borders between two charts."""
-    from ..runtime.topology import edge_table
-
+    """Half-edges 3·face + corner along borders between two charts, and along slits that divide two patches."""
     table = edge_table(surface.faces)
-    inside = table.edge_count >= 2
-    faces = table.edge_faces[inside]
-    apart = charts.face_chart[faces[:, 0]] != charts.face_chart[faces[:, 1]]
-    return table.edge_halfedges[inside][apart].reshape(-1)
+    half = table.edge_halfedges[table.edge_count >= 2]
+    face, corner = half // 3, half % 3
+    chart, patch = charts.face_chart[face], charts.face_patch[face]
+    start, end = charts.corner_uv[face, corner], charts.corner_uv[face, (corner + 1) % 3]
+    torn = (start[:, 0] != end[:, 1]).any(axis=1) | (end[:, 0] != start[:, 1]).any(axis=1)
+    apart = (chart[:, 0] != chart[:, 1]) | (torn & (patch[:, 0] != patch[:, 1]))
+    return half[apart].reshape(-1)
 
 
 def fit_assign(
@@ -128,7 +127,7 @@ def fit_assign(
     charts: Charts,
     config: FitConfig,
     generators: tuple[np.random.Generator, torch.Generator],
-    report: Report,
+    progress: Progress,
 ) -> None:
     """Cross-entropy on the patch, most samples close to the seams."""
     rng, generator = generators
@@ -145,17 +144,17 @@ def fit_assign(
         optimizer.step()
         schedule.step()
         if step % 25 == 0:
-            report(step, loss.item())
+            progress("fit charts", step, config.assign_steps, loss.item())
 
 
 def fit_networks(
-    surface: Surface, charts: Charts, net: NetConfig, config: FitConfig, seed: int, report: Report
+    surface: Surface, charts: Charts, net: NetConfig, config: FitConfig, seed: int, progress: Progress
 ) -> AtlasNetworks:
     """Assign- and Unwrap-Nets for finished charts of a surface in the unit ball; charts' uv in the same units."""
     rng, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
     patches = len(charts.patch_chart)
     networks = AtlasNetworks(patches, net, generator=generator)
     samples = sample_patches(surface, charts, max(config.samples // patches, 500), rng)
-    fit_unwrap(networks, samples, config, generator, report)
-    fit_assign(networks, surface, charts, config, (rng, generator), report)
+    fit_unwrap(networks, samples, config, generator, progress)
+    fit_assign(networks, surface, charts, config, (rng, generator), progress)
     return networks.eval()

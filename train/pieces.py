@@ -39,6 +39,11 @@ class Piece:
     slits: float
     targets: tuple[NDArray[np.float64], ...] = ()
 
+    @property
+    def method(self) -> str:
+        """How the piece became valid: "slim", or "slit" where cuts inside it helped."""
+        return "slit" if self.slits > 0.0 else "slim"
+
     def cost(self, price: float) -> float:
         """What the piece adds to the objective, its border left out."""
         return self.energy + price * self.slits

@@ -1,0 +1,100 @@
+"""From a surface to finished charts and the networks that answer for them.
+
+surface (source units) → unit ball → joint training → finishing → patches → fit.  Charts come back in source units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import torch
+
+from ..runtime.mesh import Charts, Frame, Surface
+from .finish import Finished, finish
+from .fit import fit_networks
+from .joint import train_jointly
+from .networks import AtlasNetworks, MultiChartNetworks
+from .patches import split_into_patches
+from .sampling import sample_surface
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .config import PatchConfig, TrainConfig
+
+
+class Progress(Protocol):
+    """What is told how far training is."""
+
+    def __call__(self, stage: str, step: int, steps: int, loss: float | None = None) -> None:
+        """``step`` of ``steps`` of a stage are done."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """Result of training.
+
+    charts: valid, in source units.  networks: unit ball → logits (n, p) and chart uv (n, p, 2) in source units.
+    frame: source units → unit ball.  report: JSON-ready facts.
+    """
+
+    charts: Charts
+    networks: AtlasNetworks
+    frame: Frame
+    report: dict[str, Any]
+
+
+def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
+    """Charts and networks of a welded surface.
+
+    Raises:
+        FinishError: no valid charts could be made (a defect).
+    """
+    frame = Frame.of(surface.vertices)
+    ball = Surface(frame.apply(surface.vertices), surface.faces)
+    samples = sample_surface(ball, config.start.samples, np.random.default_rng(config.seed))
+    steps = config.joint.steps
+    scorer = train_jointly(samples, config, config.seed, lambda step, loss: progress("train", step, steps, loss))
+    finished = finish(ball, log_probability(scorer), config.charts, config.finish, lambda name: progress(name, 0, 1))
+    charts = as_charts(ball, finished, config.patch)
+    # the unit ball's charts, at the scale of the source: uv in source units
+    charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
+    networks = fit_networks(ball, charts, config.net, config.fit, config.seed, progress)
+    report = {
+        "patches": len(charts.patch_chart),
+        "objective": finished.objective,
+        "slit_length": sum(piece.slits for piece in finished.pieces),
+        "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
+    }
+    return Trained(charts, networks, frame, report)
+
+
+def log_probability(networks: MultiChartNetworks) -> Any:
+    """The Assign-Net as a numpy function: (n, 3) unit ball → (n, p) log probabilities."""
+
+    @torch.no_grad()
+    def evaluate(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+        logits = networks.scores(torch.from_numpy(xyz.astype(np.float32)))
+        return torch.log_softmax(logits.double(), dim=-1).numpy()
+
+    return evaluate
+
+
+def as_charts(surface: Surface, finished: Finished, config: PatchConfig) -> Charts:
+    """Finished pieces as Charts, divided into patches."""
+    count = len(surface.faces)
+    face_chart = np.zeros(count, dtype=np.int64)
+    face_patch = np.zeros(count, dtype=np.int64)
+    corner_uv = np.zeros((count, 3, 2))
+    patch_chart: list[int] = []
+    for chart, piece in enumerate(finished.pieces):
+        face_chart[piece.ids] = chart
+        corner_uv[piece.ids] = piece.flat.uv[piece.flat.surface.faces]
+        patch = split_into_patches(surface, piece, config)
+        face_patch[piece.ids] = patch + len(patch_chart)
+        patch_chart += [chart] * (int(patch.max()) + 1)
+    methods = tuple(piece.method for piece in finished.pieces)
+    return Charts(face_chart, corner_uv, face_patch, np.array(patch_chart, dtype=np.int64), methods)
