@@ -20,16 +20,16 @@ TRIM = 100.0
 def singular_values(triangles: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
     """(2, f) float64 σ₁ ≥ σ₂ ≥ 0 of the affine maps triangles (f, 3, 3) → uv (f, 3, 2); 0 for faces without area."""
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    width = np.linalg.norm(first, axis=1)
-    height = np.linalg.norm(np.cross(first, second), axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        foot = (first * second).sum(axis=1) / width
-        column_x = (uv[:, 1] - uv[:, 0]) / width[:, None]
-        column_y = (uv[:, 2] - uv[:, 0] - column_x * foot[:, None]) * (width / height)[:, None]
+    length, doubled = np.linalg.norm(first, axis=1), np.linalg.norm(np.cross(first, second), axis=1)
+    width = np.where(length > 0.0, length, 1.0)
+    height = np.where(doubled > 0.0, doubled, 1.0) / width
+    foot = (first * second).sum(axis=1) / width
+    column_x = (uv[:, 1] - uv[:, 0]) / width[:, None]
+    column_y = (uv[:, 2] - uv[:, 0] - column_x * foot[:, None]) / height[:, None]
     a, b, c, d = column_x[:, 0], column_y[:, 0], column_x[:, 1], column_y[:, 1]
     total, difference = np.hypot(a + d, c - b), np.hypot(a - d, c + b)
     sigma = np.stack([total + difference, np.abs(total - difference)]) / 2.0
-    return np.where(height > 0.0, sigma, 0.0)
+    return np.where(doubled > 0.0, sigma, 0.0)
 
 
 def symmetric_dirichlet(large: NDArray[np.float64], small: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -51,7 +51,7 @@ def facing_segments(
     extent = np.ptp(segments.reshape(-1, 2), axis=0)
     if len(np.unique(chart)) < 2 or extent.min() <= 1e-9 * extent.max():
         return np.zeros((0, 2), dtype=np.int64)
-    points, owner = _samples(segments, spacing)
+    points, owner = sample_segments(segments, spacing)
     order = np.lexsort((chart[owner], points[:, 1], points[:, 0]))
     points, owner = points[order], owner[order]
     same = (points[1:] == points[:-1]).all(axis=1)
@@ -92,7 +92,7 @@ def _point_distance(point: NDArray[np.float64], segment: NDArray[np.float64]) ->
     return np.linalg.norm(offset - share[:, None] * along, axis=1)
 
 
-def _samples(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def sample_segments(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points (n, 2) on the segments (s, 2, 2), ends included, at most spacing apart, and the segment (n,) of each."""
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     spacing = max(spacing, float(length.sum()) / _MOST_SAMPLES)

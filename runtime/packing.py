@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 _CELLS = 256
 _FILL = 0.6
 _SPARE = 1.4
-_SHRINK = 0.8
+_SHRINK = 0.7
+_FEW = 48
+_SHRINKS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +166,13 @@ def _search(
     outlines: list[NDArray[np.float64]], area: float, padding: float, rng: np.random.Generator
 ) -> tuple[_Layout, float]:
     """The best layout found, and the cells per source unit it was found with; padding is a share of the atlas side."""
-    target = _CELLS if len(outlines) <= 24 else 2 * _CELLS
+    target = int(_CELLS * min(max(math.sqrt(len(outlines) / 24.0), 1.0), 4.0))
     length = sum(float(np.linalg.norm(outline[:, 1] - outline[:, 0], axis=1).sum()) for outline in outlines)
     unit = _unit(area, length, len(outlines), padding, target)
-    for _ in range(24):
+    for _ in range(_SHRINKS):
         cells = int(target * _SPARE)
+        if math.pi * len(outlines) * (padding * cells) ** 2 > cells**2:
+            break
         reliefs = [relief(outline * unit, padding * cells) for outline in outlines]
         layout = _attempt(reliefs, np.zeros(len(outlines), dtype=np.int64), padding, cells)
         if layout is not None:
@@ -212,11 +216,12 @@ def _improved(reliefs: list[Relief], layout: _Layout, padding: float, rng: np.ra
     k = len(reliefs)
     filled = sum(int(chart.silhouette(0.0).sum()) for chart in reliefs)
     low, best = math.isqrt(filled) - 1, layout
-    while best.cells - low > 1:
+    close = 1 if k <= _FEW else best.cells // 50
+    while best.cells - low > close:
         middle = (best.cells + low) // 2
         found = _attempt(reliefs, best.quarters, padding, middle)
         low, best = (middle, best) if found is None else (low, found)
-    tries = max(4, min(60, 600 // k)) if k > 1 else 4
+    tries = min(60, 600 // k) if k > 1 else 4
     for number in range(tries):
         quarters = rng.integers(0, 4, k)
         if number >= tries // 3:

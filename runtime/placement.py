@@ -18,10 +18,12 @@ from scipy import ndimage
 from scipy.spatial import KDTree
 
 from .errors import FinishError
+from .gaps import sample_segments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+_MOST_EXHAUSTIVE = 48
 _HALF_DIAGONAL = 0.5**0.5 + 0.01
 
 
@@ -53,28 +55,19 @@ def relief(outline: NDArray[np.float64], reach: float) -> Relief:
     width, height = (np.ceil(outline.max(axis=(0, 1))) + margin - low).astype(np.int64).tolist()
     local = outline - low
     inside = _inside(local, height, width)
-    near = ndimage.binary_dilation(
-        _touched(local, height, width), iterations=int(margin) + 1, structure=np.ones((3, 3))
-    )
+    near = np.zeros((height, width), dtype=bool)
+    ndimage.binary_dilation(_touched(local, height, width), np.ones((3, 3)), iterations=int(margin) + 1, output=near)
     rows, columns = np.nonzero(near & ~inside)
-    tree = KDTree(_dense(local, 0.25))
+    tree = KDTree(sample_segments(local, 0.25)[0])
     distance = np.where(inside, 0.0, np.inf)
     centres = np.stack([columns + 0.5, rows + 0.5], axis=1)
     distance[rows, columns] = tree.query(centres, distance_upper_bound=margin)[0]
     return Relief(distance=distance, origin=low)
 
 
-def _dense(segments: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Points (n, 2) on segments (s, 2, 2), at most spacing apart."""
-    steps = np.maximum(np.ceil(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / spacing).astype(np.int64), 1)
-    owner = np.repeat(np.arange(len(segments)), steps)
-    share = ((np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)) / steps[owner])[:, None]
-    return segments[owner, 0] * (1.0 - share) + segments[owner, 1] * share
-
-
 def _touched(segments: NDArray[np.float64], height: int, width: int) -> NDArray[np.bool_]:
     grid = np.zeros((height, width), dtype=bool)
-    cell = _dense(segments, 0.5).astype(np.int64)
+    cell = sample_segments(segments, 0.5)[0].astype(np.int64)
     grid[cell[:, 1], cell[:, 0]] = True
     return grid
 
@@ -145,7 +138,7 @@ def place(masks: list[NDArray[np.bool_]], resolution: int) -> NDArray[np.int64] 
     Raises:
         FinishError: xatlas broke a silhouette up or put two on one cell (a defect).
     """
-    if max(max(mask.shape) for mask in masks) > resolution:
+    if max(max(mask.shape) for mask in masks) > resolution or sum(int(mask.sum()) for mask in masks) > resolution**2:
         return None
     soups = [_soup(mask) for mask in masks]
     count = [len(soup) for soup in soups]
@@ -154,7 +147,7 @@ def place(masks: list[NDArray[np.bool_]], resolution: int) -> NDArray[np.int64] 
     atlas = xatlas.Atlas()
     indices = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
     atlas.add_uv_mesh(corners.astype(np.float32), indices, owner.astype(np.uint32).reshape(-1, 1))
-    atlas.generate(pack_options=_options(resolution))
+    atlas.generate(pack_options=_options(resolution, exhaustive=len(masks) <= _MOST_EXHAUSTIVE))
     if atlas.chart_count != len(masks):
         raise FinishError(f"xatlas saw {atlas.chart_count} charts in {len(masks)} silhouettes; please report the mesh")
     if atlas.atlas_count != 1 or (atlas.width, atlas.height) != (resolution, resolution):
@@ -167,13 +160,13 @@ def place(masks: list[NDArray[np.bool_]], resolution: int) -> NDArray[np.int64] 
     return offset
 
 
-def _options(resolution: int) -> xatlas.PackOptions:
+def _options(resolution: int, *, exhaustive: bool) -> xatlas.PackOptions:
     options = xatlas.PackOptions()
     options.resolution = resolution
     options.texels_per_unit = 1.0
     options.padding = 0
     options.bilinear = False
-    options.bruteForce = True
+    options.bruteForce = exhaustive
     options.rotate_charts = False
     options.rotate_charts_to_axis = False
     options.create_image = False
