@@ -109,10 +109,17 @@ def _leftover_edges(table: EdgeTable, cost: NDArray[np.float64], paths: Shortest
 
 
 def _far_path(count: int, table: EdgeTable, cost: NDArray[np.float64]) -> list[int]:
-    """A shortest path between two vertices far apart: the farthest from vertex 0, and the farthest from that one."""
+    """A shortest path between two vertices far apart: the farthest from vertex 0, and the farthest from that one.
+
+    Two edges at least, as one alone opens nothing: where all vertices are neighbours, the path goes on to a third.
+    """
     first = int(shortest_paths(count, table.edges, cost, np.array([0])).distance.argmax())
     paths = shortest_paths(count, table.edges, cost, np.array([first]))
-    return trace_back(paths.parent, int(paths.distance.argmax()))
+    path = trace_back(paths.parent, int(paths.distance.argmax()))
+    if len(path) > 2:
+        return path
+    around = table.edges[(table.edges == path[0]).any(axis=1)]
+    return [int(np.setdiff1d(around, path)[0]), *path]
 
 
 def prune(table: EdgeTable, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
