@@ -1,4 +1,4 @@
-"""The geometric start: K clusters of a surface, each flattened onto its own plane.   n samples · k clusters · unit ball.
+"""The geometric start: K clusters of a surface, each projected onto its plane.   n samples · K clusters · unit ball.
 
 Training from random weights collapses to two charts; from here it only has to move borders and bend planes.
 """
@@ -44,8 +44,9 @@ def cluster(
 def plane_projection(
     xyz: NDArray[np.float64], normal: NDArray[np.float64], label: NDArray[np.int64], count: int
 ) -> NDArray[np.float64]:
-    """Uv (count, n, 2): each point projected onto the plane of each cluster, seen from outside (mean normal towards the eye).
+    """Uv (count, n, 2): each point projected onto the plane of each cluster, seen from outside.
 
+    Outside is where the mean normal points; where the normals cancel out, the plane faces the flattest direction.
     The axes are the cluster's principal directions within its plane; the origin is its mean.
     """
     uv = np.zeros((count, len(xyz), 2))
@@ -55,7 +56,9 @@ def plane_projection(
             continue
         centred = xyz - xyz[members].mean(axis=0)
         axis = normal[members].mean(axis=0)
-        axis /= max(np.linalg.norm(axis), 1e-12)
+        if np.linalg.norm(axis) < 1e-9:  # a sheet with two sides, a closed surface
+            axis = np.linalg.svd(centred[members], full_matrices=False)[2][-1]
+        axis /= np.linalg.norm(axis)
         flat = centred[members] - np.outer(centred[members] @ axis, axis)
         first = np.linalg.svd(flat, full_matrices=False)[2][0]
         first -= (first @ axis) * axis
