@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def joint_loss(cycle: Cycle, xyz: Tensor, normal: Tensor, config: JointConfig) -> Tensor:
     """Scalar: distortion + cycle + normal, each weighted by the chart probability.  xyz, normal (n, 3)."""
     score = torch.softmax(cycle.logits, dim=-1).T
-    total = config.distortion_weight * arap_energy(cycle.uv_jet[1:])
+    total = config.distortion_weight * arap_energy(cycle.jacobian)
     total = total + config.cycle_weight * position_gap(cycle.xyz, xyz)
     total = total + config.normal_weight * cosine_gap(cycle.normal, normal)
     return weighted_mean(total, score)

@@ -40,8 +40,8 @@ class Dense(nn.Module):
 
     def jet(self, x: Tensor) -> Tensor:
         """Value and tangents, (3, …, n, c): only the value gets the bias."""
-        y = x @ self.weight
-        return torch.cat([y[:1] + self.bias, y[1:]])
+        value, tangents = torch.split(x @ self.weight, [1, 2])
+        return torch.cat([value + self.bias, tangents])
 
 
 class Perceptron(nn.Module):
@@ -74,9 +74,10 @@ class Perceptron(nn.Module):
 
 def silu_jet(x: Tensor) -> Tensor:
     """SiLU of a jet: value → silu(value), tangent → silu'(value) · tangent."""
-    sigmoid = torch.sigmoid(x[:1])
-    slope = sigmoid * (1.0 + x[:1] * (1.0 - sigmoid))
-    return torch.cat([x[:1] * sigmoid, slope * x[1:]])
+    value, tangents = torch.split(x, [1, 2])  # its backward is a cat; that of two slices fills two zero tensors
+    sigmoid = torch.sigmoid(value)
+    slope = sigmoid * (1.0 + value * (1.0 - sigmoid))
+    return torch.cat([value * sigmoid, slope * tangents])
 
 
 class FourierFeatures(nn.Module):
@@ -102,12 +103,13 @@ class FourierFeatures(nn.Module):
 class Cycle(NamedTuple):
     """What the 3D → 2D → 3D cycle yields for n points and p patches.
 
-    logits (n, p); uv_jet (3, p, n, 2): uv and its derivatives along two surface tangents; xyz (p, n, 3) and normal (p, n, 3):
-    what the Wrap-Nets make of uv (normals not normalised).
+    logits (n, p).  uv (p, n, 2), jacobian (2, p, n, 2): its derivatives along two surface tangents.  xyz (p, n, 3) and
+    normal (p, n, 3): what the Wrap-Nets make of uv (normals not normalised).
     """
 
     logits: Tensor
-    uv_jet: Tensor
+    uv: Tensor
+    jacobian: Tensor
     xyz: Tensor
     normal: Tensor
 
@@ -130,9 +132,9 @@ class MultiChartNetworks(nn.Module):
     def forward(self, xyz: Tensor, tangents: Tensor) -> Cycle:
         """The cycle at points xyz (n, 3) with unit tangents (2, n, 3)."""
         feature = silu_jet(self.embedding.jet(torch.cat([xyz[None], tangents])))
-        uv_jet = self.unwrap.jet(feature[:, None])
-        wrapped = self.wrap(uv_jet[0])
-        return Cycle(self.assign(feature[0]), uv_jet, wrapped[..., :3], wrapped[..., 3:])
+        uv, tangents = torch.split(self.unwrap.jet(feature[:, None]), [1, 2])
+        position, normal = torch.split(self.wrap(uv[0]), 3, dim=-1)
+        return Cycle(self.assign(feature.unbind()[0]), uv[0], tangents, position, normal)
 
 
 class AtlasNetworks(nn.Module):
