@@ -215,9 +215,10 @@ def test_separating_writes_neither_to_the_start_nor_to_its_pins() -> None:
 def test_slim_converges_where_the_goal_is_within_reach() -> None:
     surface, _ = ring(0.4)
     start = circle_start(surface)
-    uv = converge(surface, Relaxed(start, {}), 0.0, CONFIG)
+    goal = 0.01 * excess_energy(surface, start)
+    uv = converge(surface, Relaxed(start, {}), goal, CONFIG)
     assert uv is not None
-    assert excess_energy(surface, uv) < 0.01 * excess_energy(surface, start)
+    assert excess_energy(surface, uv) < goal
 
 
 def test_slim_gives_up_when_the_goal_is_out_of_sight() -> None:
