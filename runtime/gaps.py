@@ -72,10 +72,23 @@ def facing_segments(
 
 def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) distances of segments first and second, both (n, 2, 2); 0 where they cross."""
-    pairs = [(first[:, 0], second), (first[:, 1], second), (second[:, 0], first), (second[:, 1], first)]
-    distance = np.min([_point_distance(point, segment) for point, segment in pairs], axis=0)
+    one, two = closest_points(first, second)
     crosses = (_sides(first, second) < 0.0) & (_sides(second, first) < 0.0)
-    return np.where(crosses, 0.0, distance)
+    return np.where(crosses, 0.0, np.linalg.norm(one - two, axis=1))
+
+
+def closest_points(
+    first: NDArray[np.float64], second: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Closest points (n, 2) on segments first and (n, 2) on second, both (n, 2, 2), that don't cross."""
+    ends = [(first[:, 0], second), (first[:, 1], second), (second[:, 0], first), (second[:, 1], first)]
+    feet = np.stack([_foot(point, segment) for point, segment in ends], axis=1)
+    points = np.stack([point for point, _ in ends], axis=1)
+    best = np.linalg.norm(points - feet, axis=2).argmin(axis=1)
+    row = np.arange(len(best))
+    point, foot = points[row, best], feet[row, best]
+    own = (best < 2)[:, None]
+    return np.where(own, point, foot), np.where(own, foot, point)
 
 
 def _sides(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -84,12 +97,12 @@ def _sides(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[n
     return np.prod(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0], axis=1)
 
 
-def _point_distance(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) distances of points (n, 2) from segments (n, 2, 2)."""
+def _foot(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) closest points on segments (n, 2, 2) to points (n, 2)."""
     along, offset = segment[:, 1] - segment[:, 0], point - segment[:, 0]
     length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
     share = np.clip((along * offset).sum(axis=1) / length, 0.0, 1.0)
-    return np.linalg.norm(offset - share[:, None] * along, axis=1)
+    return segment[:, 0] + share[:, None] * along
 
 
 def sample_segments(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -6,7 +6,7 @@ and moved; never mirrored, never stretched.  Outlines of two charts stay 2·P ap
 
 The charts' size in cells is fixed and R is searched for: the smaller the square that still holds them, the larger they
 become when it is stretched to S.  A local search over quarter turns lowers R; then all charts grow where they lie,
-until the first two are as close as they may be.
+moved apart where that helps, until they jam.
 """
 
 from __future__ import annotations

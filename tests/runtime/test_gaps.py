@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from flexpara.runtime.gaps import facing_segments, sample_segments, segment_distance, smallest_chart_gap
+from flexpara.runtime.gaps import closest_points, facing_segments, sample_segments, segment_distance, smallest_chart_gap
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,3 +61,13 @@ def test_random_rectangles_agree_with_all_pairs(seed: int) -> None:
     assert gap(*boxes, spacing=0.05) == pytest.approx(expected, abs=1e-12)
     pairs = facing_segments(segments, chart, spacing=0.05, reach=0.1)
     assert (chart[pairs[:, 0]] != chart[pairs[:, 1]]).all()
+
+
+def test_closest_points_lie_on_their_segments() -> None:
+    rng = np.random.default_rng(1)
+    first, second = rng.random((200, 2, 2)), rng.random((200, 2, 2)) + np.array([2.0, 0.0])
+    one, two = closest_points(first, second)
+    assert np.linalg.norm(one - two, axis=1) == pytest.approx(segment_distance(first, second))
+    for point, segment in ((one, first), (two, second)):
+        detour = np.linalg.norm(point - segment[:, 0], axis=1) + np.linalg.norm(point - segment[:, 1], axis=1)
+        assert detour == pytest.approx(np.linalg.norm(segment[:, 1] - segment[:, 0], axis=1))

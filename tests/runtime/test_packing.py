@@ -204,7 +204,7 @@ def xatlas_coverage(charts: Charts, size: int, padding: int) -> float:
     return float(area * atlas.texels_per_unit**2 / max(atlas.width, atlas.height) ** 2)
 
 
-def test_fandisk_in_its_box_charts_covers_more_than_with_xatlas_alone(models: Path) -> None:
+def test_fandisk_in_its_box_charts_covers_as_much_as_with_xatlas_alone(models: Path) -> None:
     mesh = trimesh.load_mesh(models / "fandisk.obj", process=False, skip_materials=True)
     vertices, weld = np.unique(np.asarray(mesh.vertices, dtype=np.float64), axis=0, return_inverse=True)
     surface = Surface(vertices, weld.reshape(-1)[np.asarray(mesh.faces)].astype(np.int64))
@@ -214,4 +214,4 @@ def test_fandisk_in_its_box_charts_covers_more_than_with_xatlas_alone(models: Pa
     covered = measure(surface, atlas.corner_uv, atlas.face_chart, size=1024)
     assert covered.chart_gap_texels is not None
     assert covered.chart_gap_texels >= 8.0
-    assert covered.packing_efficiency > 0.9 * xatlas_coverage(charts, 1024, 4)
+    assert covered.packing_efficiency > 0.97 * xatlas_coverage(charts, 1024, 4)
