@@ -137,9 +137,11 @@ class PatchConfig:
     """Dividing charts into patches that one smooth network can answer for."""
 
     neighbours: int = 24
-    """Nearest faces looked at from each face."""
+    """Nearest samples looked at from each sample; the density of samples follows from it and from reach."""
     reach: float = 0.08
-    """Greatest distance at which two faces are close."""
+    """Greatest distance at which two samples are close."""
+    rings: int = 3
+    """Edges that a step may cross where distances along the piece are measured from face to face."""
     stretch: float = 2.0
     """uv distance per distance in space that counts as smooth."""
     gap: float = 0.03

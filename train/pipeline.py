@@ -93,7 +93,7 @@ def as_charts(surface: Surface, finished: Finished, config: PatchConfig) -> Char
     for chart, piece in enumerate(finished.pieces):
         face_chart[piece.ids] = chart
         corner_uv[piece.ids] = piece.flat.uv[piece.flat.surface.faces]
-        patch = split_into_patches(surface, piece, config)
+        patch = split_into_patches(piece, config)
         face_patch[piece.ids] = patch + len(patch_chart)
         patch_chart += [chart] * (int(patch.max()) + 1)
     methods = tuple(piece.method for piece in finished.pieces)
