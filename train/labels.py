@@ -31,9 +31,10 @@ def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> Du
     """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
 
     The discount follows 1 − |cos(half the dihedral deviation)|-like growth: none on flat ground, full from 60° on.
-    Non-manifold edges join nothing: the surface is cut there anyway.
+    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join nothing: the surface
+    is cut there anyway.
     """
-    inside = np.flatnonzero(table.edge_count == 2)
+    inside = np.flatnonzero(table.manifold)
     pairs = table.edge_faces[inside]
     ends = surface.vertices[table.edges[inside]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -78,6 +78,13 @@ def test_three_sheets_on_one_edge_are_not_joined() -> None:
     assert len(graph_of(book).pairs) == 0
 
 
+def test_faces_of_opposite_orientation_are_not_joined() -> None:
+    """They are cut apart before they are flattened: a piece across such an edge would fall in two."""
+    plain = hinge(0.0)
+    flipped = Surface(plain.vertices, np.array([[0, 1, 2], [0, 1, 3]]))
+    assert len(graph_of(flipped).pairs) == 0
+
+
 def test_energy_adds_the_labels_and_the_seams() -> None:
     graph = DualGraph(np.array([[0, 1], [1, 2]]), np.ones(2), np.array([0.5, 0.25]))
     unary = np.array([[1.0, 9.0], [9.0, 2.0], [9.0, 3.0]])
