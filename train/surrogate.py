@@ -43,6 +43,6 @@ def carry_labels(
     def feature(of: Surface) -> NDArray[np.float64]:
         return np.concatenate([of.triangles.mean(axis=1), normal_weight * of.face_normals()], axis=1)
 
-    nearest = cKDTree(feature(coarse)).query(feature(surface), k=neighbours)[1]
+    nearest = cKDTree(feature(coarse)).query(feature(surface), k=range(1, neighbours + 1))[1]
     votes = label[nearest]
     return np.stack([(votes == k).mean(axis=1) for k in range(int(label.max()) + 1)], axis=1)
