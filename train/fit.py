@@ -85,16 +85,21 @@ def solve_last_layer(networks: AtlasNetworks, samples: PatchSamples) -> None:
     )
     target = (samples.uv * samples.scale + samples.centre).double()
     solution = torch.linalg.solve(gram + ridge, design.mT @ target)
-    last = networks.unwrap.layers[-1]
-    last.weight.copy_(solution[:, :-1])
-    last.bias.copy_(solution[:, -1:])
+    weight, bias = networks.unwrap.layers[-1].parameters()
+    weight.copy_(solution[:, :-1])
+    bias.copy_(solution[:, -1:])
 
 
 def sample_seams(
     surface: Surface, charts: Charts, count: int, reach: float, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points (count, 3) beside chart borders, at normally distributed distances, and their faces (count,)."""
+    """Points (count, 3) beside seams, at normally distributed distances, and their faces (count,).
+
+    No points where there is no seam.
+    """
     half = seam_halfedges(surface, charts)
+    if len(half) == 0:
+        return np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
     face, corner = half // 3, half % 3
     corners = surface.triangles[face]
     row = np.arange(len(half))
