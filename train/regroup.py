@@ -176,7 +176,7 @@ def halves(
 ) -> list[NDArray[np.int64]]:
     """The faces cut in two at half their distance from a seed face, as connected parts."""
     distance = dual_distance(ids, graph, centroids, seed)
-    near = distance <= np.median(distance)
+    near = distance < np.median(distance)  # the seed alone at least, and never the farthest
     return connected_parts(ids, near, graph)
 
 
