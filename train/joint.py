@@ -56,7 +56,10 @@ class SampleBank:
 def fit_start(
     networks: MultiChartNetworks, bank: SampleBank, label: Tensor, uv: Tensor, steps: int, batch: int
 ) -> None:
-    """Teach the networks the start: label (n,) int64 by cross-entropy, uv (p, n, 2) and the way back on each point's own patch."""
+    """Teach the networks the start, in place: label (n,) int64 by cross-entropy, uv (p, n, 2) and the way back.
+
+    Each point counts on its own patch only.
+    """
     optimizer, schedule = one_cycle(networks, steps, 5e-3)
     for _ in range(steps):
         pick = bank.draw(batch)
@@ -76,7 +79,10 @@ def fit_start(
 def train_jointly(
     samples: Samples, config: TrainConfig, seed: int, report: Callable[[int, float], None]
 ) -> MultiChartNetworks:
-    """Networks of ``config.charts`` patches, from the geometric start.  ``report(step, loss)`` is called now and then."""
+    """Networks of ``config.charts`` patches, from the geometric start.
+
+    ``report(step, loss)`` is called every 20 steps and after the last.
+    """
     rng, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
     networks = MultiChartNetworks(config.charts, config.net, generator=generator)
     bank = SampleBank(samples, generator)

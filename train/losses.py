@@ -1,6 +1,6 @@
 """Per-element losses of the multi-chart mode.   n points · p patches · jets (3, …) = (value, ∂/∂t₁, ∂/∂t₂).
 
-Unreduced: ``weighted_mean`` is the only reduction, so that a chart probability, a mask or 1 weights every loss the same way.
+Unreduced: ``weighted_mean`` is the only reduction, so a chart probability, a mask or 1 weights every loss the same way.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from torch import Tensor
 def arap_energy(jacobian: Tensor, *, eps: float = 1e-12) -> Tensor:
     """‖J − R‖² to the closest rotation R, = (σ₁ − 1)² + (σ₂ − 1)² with σ₂ < 0 for a flip.   (2, …, 2) → (…).
 
-    ``jacobian[i]`` is the derivative of uv along unit tangent i.  max_R tr(RᵀJ) = √((a + d)² + (b − c)²), so no SVD is needed;
-    eps keeps the gradient finite where that root vanishes (J a reflection).
+    ``jacobian[i]`` is the derivative of uv along unit tangent i.  max_R tr(RᵀJ) = √((a + d)² + (b − c)²), so no SVD is
+    needed; eps keeps the gradient finite where that root vanishes (J zero or a reflection).
     """
     (a, c), (b, d) = jacobian[0].unbind(-1), jacobian[1].unbind(-1)
     trace = torch.sqrt((a + d) ** 2 + (b - c) ** 2 + eps)

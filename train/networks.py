@@ -3,13 +3,15 @@
 n points · p patches (the paper's K charts) · xyz in the unit ball · uv in chart coordinates · d width.
 All p Unwrap-Nets (and all p Wrap-Nets) are one batch of matrix products: no loop over patches.
 
-A *jet* carries a value and its two directional derivatives, (3, n, c) = (value, ∂/∂t₁, ∂/∂t₂), through a network in forward mode:
-two tangents cost about two more forward passes, where reverse mode would need one pass per output and a second-order graph.
+A *jet* carries a value and its two directional derivatives, (3, n, c) = (value, ∂/∂t₁, ∂/∂t₂), through a network in
+forward mode: two tangents cost about two more forward passes, where reverse mode would need one pass per output and a
+second-order graph.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import torch
@@ -47,8 +49,8 @@ class Dense(nn.Module):
 class Perceptron(nn.Module):
     """Dense layers with SiLU between them, none after the last.
 
-    The paper takes LeakyReLU(0.01), whose derivative is piecewise constant: the distortion of a map then says nothing about
-    where its kinks should go.  SiLU gives the same shapes a useful gradient, which small networks need.
+    The paper takes LeakyReLU(0.01), whose derivative is piecewise constant: the distortion of a map then says nothing
+    about where its kinks should go.  SiLU gives the same shapes a useful gradient, which small networks need.
     """
 
     def __init__(self, channels: tuple[int, ...], *, copies: int | None = None, generator: torch.Generator) -> None:
@@ -56,7 +58,7 @@ class Perceptron(nn.Module):
         last = len(channels) - 2
         self.layers = nn.ModuleList(
             Dense(a, b, copies=copies, gain=1.0 if i == last else 2.0, generator=generator)
-            for i, (a, b) in enumerate(zip(channels, channels[1:], strict=False))
+            for i, (a, b) in enumerate(pairwise(channels))
         )
 
     def forward(self, x: Tensor) -> Tensor:
@@ -67,9 +69,10 @@ class Perceptron(nn.Module):
 
     def jet(self, x: Tensor) -> Tensor:
         """The same on jets (3, …, n, c)."""
-        for layer in self.layers[:-1]:
+        *inner, last = (layer for layer in self.layers if isinstance(layer, Dense))
+        for layer in inner:
             x = silu_jet(layer.jet(x))
-        return self.layers[-1].jet(x)
+        return last.jet(x)
 
 
 def silu_jet(x: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""Points on a surface: area-weighted samples with normals and tangents.   n samples · xyz in the frame of the surface given."""
+"""Points on a surface: area-weighted samples, normals, tangents.   n samples · xyz in the surface's own frame."""
 
 from __future__ import annotations
 
