@@ -1,14 +1,20 @@
-"""What the tests of training share: one torch thread, since for networks this small two mostly wait for each other."""
+"""What the tests of training share: finished charts by hand, and one torch thread, as small networks want it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 import torch
 
+from flexpara.runtime.mesh import Charts, Frame, Surface
+from flexpara.runtime.samples import make_sample
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from numpy.typing import NDArray
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -18,3 +24,40 @@ def one_torch_thread() -> Iterator[None]:
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
+
+
+def charts_by(face_chart: NDArray[np.int64], corner_uv: NDArray[np.float64]) -> Charts:
+    """Charts of one patch each."""
+    count = int(face_chart.max()) + 1
+    return Charts(face_chart, corner_uv, face_chart, np.arange(count), ("slim",) * count)
+
+
+@pytest.fixture
+def sheet() -> Surface:
+    """The square [−0.7, 0.7]² in the plane z = 0."""
+    corner = np.arange(11**2).reshape(11, 11)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    line = np.linspace(-0.7, 0.7, 11)
+    x, y = np.meshgrid(line, line, indexing="ij")
+    xyz = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    return Surface(xyz, np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3))
+
+
+@pytest.fixture
+def two_halves(sheet: Surface) -> tuple[Surface, Charts]:
+    """A sheet cut at x = 0: the left half keeps xy as uv, the right half is turned by 90° and moved far away."""
+    right = (sheet.triangles[:, :, 0].mean(axis=1) > 0.0).astype(np.int64)
+    xy = sheet.triangles[:, :, :2]
+    turned = np.stack([5.0 - xy[..., 1], xy[..., 0] - 3.0], axis=-1)
+    return sheet, charts_by(right, np.where(right[:, None, None] == 1, turned, xy))
+
+
+@pytest.fixture
+def six_sides() -> tuple[Surface, Charts]:
+    """A cube in the unit ball, each side a chart with its own coordinates as uv."""
+    vertices, faces = make_sample("cube", resolution=24)
+    surface = Surface(Frame.of(vertices).apply(vertices), faces)
+    normal = surface.face_normals()
+    axis = np.abs(normal).argmax(axis=1)
+    u, v = (np.take_along_axis(surface.triangles, ((axis + i) % 3)[:, None, None], axis=2) for i in (1, 2))
+    return surface, charts_by(axis * 2 + (normal.sum(axis=1) > 0.0), np.concatenate([u, v], axis=2))
