@@ -72,7 +72,7 @@ class LabelConfig:
 class ContactConfig:
     """Taking overlap inside a chart apart."""
 
-    rounds: int = 10
+    rounds: int = 6
     """Rounds of pinning, SLIM and the exact test."""
     iterations: int = 2
     """SLIM iterations a round."""
@@ -82,11 +82,11 @@ class ContactConfig:
     """Blocks at most."""
     still: float = 0.05
     """A block that lowers the energy by less than this share ends the run."""
-    hope: float = 0.3
-    """Share of the way to its goal that the first block must make."""
+    patience: float = 2.0
+    """How many more drops like the last one a block is trusted with."""
     step: int = 3
     """SLIM iterations between two tests where contacts are needed."""
-    steps: int = 5
+    steps: int = 4
     """Such steps at most."""
     margin: float = 0.01
     """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
@@ -108,6 +108,10 @@ class ReliefConfig:
     """Slits shorter than this are judged as if they had this length."""
     near: float = 0.03
     """No slit aims at a vertex closer to the border than this."""
+    ways: int = 1
+    """Ways to the same vertex that are tried."""
+    apart: float = 0.6
+    """How far from the first way's start the second must start, as a share of its length."""
     failures: int = 3
     """Slits that may fail to pay before a chart is left as it is."""
     most: int = 12
@@ -124,12 +128,16 @@ class FinishConfig:
 
     labels: LabelConfig = field(default_factory=LabelConfig)
     relief: ReliefConfig = field(default_factory=ReliefConfig)
-    surrogate_faces: int = 3000
+    surrogate_faces: int = 4000
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
     necks: int = 2
     """Borders tried for each split and seed."""
+    shared: float = 0.1
+    """Share of the smaller border that two pieces must share to be worth a merge."""
+    dear: float = 0.01
+    """Excess energy over which a finished piece is slit once more, with contacts."""
 
 
 @dataclass(frozen=True)

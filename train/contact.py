@@ -121,20 +121,20 @@ def excess_energy(surface: Surface, uv: NDArray[np.float64]) -> float:
 
 
 def converge(surface: Surface, start: Relaxed, goal: float, config: ContactConfig) -> NDArray[np.float64] | None:
-    """Uv (v, 2) after SLIM until it hardly moves; None as soon as ``goal`` is out of sight.
+    """The uv (v, 2) after SLIM until it hardly moves; None as soon as ``goal`` (excess energy) is out of sight.
 
-    A slit swings through overlap while it opens, so only the end is worth an overlap test.  Out of sight: the first block
-    of iterations made less than ``config.hope`` of the way from the start's energy to the goal.
+    A slit swings through overlap while it opens, so only the end is worth an overlap test.  SLIM converges about
+    geometrically: out of sight is a goal that ``config.patience`` more drops like the last one would not reach.
     """
     solver = Slim(surface, start.uv, as_pins(start.pins, config.weight))
-    first = energy = excess_energy(surface, start.uv)
-    uv = start.uv
+    energy, uv = excess_energy(surface, start.uv), start.uv
     for _ in range(config.blocks):
         uv = solver.run(config.block)
         previous, energy = energy, excess_energy(surface, uv)
-        if first - energy < config.hope * (first - goal):
+        drop = previous - energy
+        if energy - config.patience * drop > goal:
             return None
-        if previous - energy < config.still * previous:
+        if drop < config.still * previous:
             break
     return uv
 

@@ -60,6 +60,8 @@ def finish(
     if coarse is not surface:
         stage("carry labels back")
         search = carried_back(surface, coarse, search, charts, config)
+    stage("slit")
+    search.relieve_all(config.dear, contacts=True)
     pieces = sorted(search.pieces.values(), key=lambda piece: int(piece.ids.min()))
     stage("exact check")
     verify(pieces)
@@ -76,7 +78,7 @@ def regrouped(surface: Surface, log_probability: LogProbability, charts: int, co
     search = Regrouping(surface, graph, config)
     for number in range(int(pieces.max()) + 1):
         search.add_valid(np.flatnonzero(pieces == number))
-    search.relieve_all()
+    search.relieve_all(0.0)
     search.search(charts + component_count(graph, len(label)) - 1)
     return search
 
@@ -93,8 +95,8 @@ def carried_back(surface: Surface, coarse: Surface, found: Regrouping, charts: i
     search = Regrouping(surface, graph, replace(config, rounds=0))
     for number in range(int(piece.max()) + 1):
         ids = np.flatnonzero(piece == number)
-        source = keys[np.bincount(smooth[ids]).argmax()]
-        search.add_valid(ids, found.pieces[int(source)].targets)
+        source = found.pieces[int(keys[np.bincount(smooth[ids]).argmax()])]
+        search.add_valid(ids, source.relief)
     search.search(limit)
     return search
 

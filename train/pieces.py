@@ -15,7 +15,7 @@ from ..runtime.topology import boundary_loops, edge_table, euler_characteristic,
 from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_overlaps
 from .disks import cut_open, disk_cuts
 from .flatten import circle_map, fill_holes, slim, sorted_loops
-from .relief import Flat, relieve, slit_along
+from .relief import Flat, Slit, relieve, slit_along
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,14 +30,14 @@ class Piece:
     """A set of faces and its valid flattening.
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the area of the whole surface.
-    slits: length of the cuts inside the piece, in √A.  targets: the points that relief slits lead to, in their order.
+    slits: length of the cuts inside the piece, in √A.  relief: the relief slits, in their order.
     """
 
     ids: NDArray[np.int64]
     flat: Flat
     energy: float
     slits: float
-    targets: tuple[NDArray[np.float64], ...] = ()
+    relief: tuple[Slit, ...] = ()
 
     @property
     def method(self) -> str:
@@ -73,20 +73,24 @@ def openings(piece: Surface, crease_discount: float) -> Iterator[Surface]:
         yield Surface(piece.vertices[old], faces)
 
 
-def flattened(piece: Surface, config: ContactConfig) -> NDArray[np.float64] | None:
-    """Uv (v, 2) of a disk, holes allowed, after SLIM: without flips and overlap, or None.
+def flattened(piece: Surface, config: ContactConfig, goal: float) -> NDArray[np.float64] | None:
+    """The uv (v, 2) of a disk, holes allowed, after SLIM: without flips and overlap.
 
-    Holes are filled while SLIM runs, so that they stay open.  The circle map is valid and SLIM leaves it step by step, so
-    where the end overlaps, early states are tried.
+    None where that can't be had, or where ``goal`` (excess energy, source units squared) is out of sight.  Holes are filled
+    while SLIM runs, so that they stay open.  The circle map is valid and SLIM leaves it step by step, so where the end
+    overlaps, early states are tried.
     """
     outer, *holes = sorted_loops(piece)
     filled = fill_holes(piece, holes)
     start = circle_map(filled, outer)
     edges = boundary_edges(piece.faces)
-    free = converge(filled, Relaxed(start, {}), np.inf, config)
-    for uv in (free, *(slim(filled, start, count) for count in (3, 1))):
-        if uv is not None and not rim_overlaps(piece.faces, edges, uv[: len(piece.vertices)]):
-            return uv[: len(piece.vertices)]
+    free = converge(filled, Relaxed(start, {}), goal, config)
+    if free is None:
+        return None
+    for attempt in (lambda: free, lambda: slim(filled, start, 3), lambda: slim(filled, start, 1)):
+        uv = attempt()[: len(piece.vertices)]
+        if not rim_overlaps(piece.faces, edges, uv):
+            return uv
     return None
 
 
@@ -95,20 +99,24 @@ def make_piece(
     ids: NDArray[np.int64],
     total_area: float,
     config: FinishConfig,
-    targets: tuple[NDArray[np.float64], ...] = (),
+    slits: tuple[Slit, ...] = (),
+    goal: float = np.inf,
 ) -> Piece | None:
-    """The best plain flattening of the faces, slit to the targets and where topology asks for it; None where all overlap."""
+    """The best plain flattening of the faces, with the slits given and where topology asks for it.
+
+    None where all overlap, or cost more than ``goal`` (excess energy over the whole area).
+    """
     whole = extract(surface, ids)
     unit, best = float(np.sqrt(total_area)), None
     for plain in openings(whole, config.relief.crease_discount):
-        disk = slit_along(plain, list(targets), config.relief)
-        uv = flattened(disk, config.relief.contact)
+        disk = slit_along(plain, slits, config.relief)
+        uv = flattened(disk, config.relief.contact, goal * total_area)
         if uv is None:
             continue
         flat = Flat(disk, uv, {})
-        slits = (border_length(disk) - border_length(whole)) / 2.0 / unit
+        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
         energy = excess_energy(disk, uv) / total_area
-        piece = Piece(ids, flat, energy, slits, targets)
+        piece = Piece(ids, flat, energy, length, slits)
         if best is None or piece.cost(config.relief.price) < best.cost(config.relief.price):
             best = piece
     return best
@@ -117,7 +125,7 @@ def make_piece(
 def relieved(piece: Piece, total_area: float, config: ReliefConfig) -> Piece:
     """The piece with the slits that pay."""
     before = border_length(piece.flat.surface)
-    flat, targets = relieve(piece.flat, total_area, config)
-    slits = piece.slits + (border_length(flat.surface) - before) / 2.0 / float(np.sqrt(total_area))
+    flat, slits = relieve(piece.flat, total_area, config)
+    length = piece.slits + (border_length(flat.surface) - before) / 2.0 / float(np.sqrt(total_area))
     energy = excess_energy(flat.surface, flat.uv) / total_area
-    return Piece(piece.ids, flat, energy, slits, (*piece.targets, *targets))
+    return Piece(piece.ids, flat, energy, length, (*piece.relief, *slits))

@@ -7,7 +7,7 @@ between two charts; a split costs one and frees what could not be flattened: a l
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -22,9 +22,14 @@ if TYPE_CHECKING:
 
     from ..runtime.mesh import Surface
     from .config import FinishConfig
+    from .relief import Slit
 
 
-Targets = tuple["NDArray[np.float64]", ...]
+class Weighed(NamedTuple):
+    """A merge that was tried: the piece, or None, and the goal it was given."""
+
+    piece: Piece | None
+    goal: float
 
 
 class Regrouping:
@@ -38,7 +43,7 @@ class Regrouping:
         self.centroids = surface.triangles.mean(axis=1)
         self.stubborn: set[int] = set()
         self.pieces: dict[int, Piece] = {}
-        self.merges: dict[tuple[int, int], Piece | None] = {}
+        self.merges: dict[tuple[int, int], Weighed] = {}
         self._next = 0
 
     def add(self, piece: Piece) -> int:
@@ -47,22 +52,24 @@ class Regrouping:
         self._next += 1
         return self._next - 1
 
-    def add_valid(self, ids: NDArray[np.int64], targets: Targets = ()) -> None:
-        """Faces as one valid piece, slit to the targets, or halved until they are valid."""
-        piece = self.weigh(ids, targets) or (self.weigh(ids) if targets else None)
+    def add_valid(self, ids: NDArray[np.int64], slits: tuple[Slit, ...] = ()) -> None:
+        """Faces as one valid piece, with the slits given, or halved until they are valid."""
+        piece = self.weigh(ids, slits) or (self.weigh(ids) if slits else None)
         if piece is not None:
             self.add(piece)
             return
         for half in halves(ids, self.graph, self.centroids, self.farthest(ids)):
             self.add_valid(half)
 
-    def weigh(self, ids: NDArray[np.int64], targets: Targets = ()) -> Piece | None:
-        """A flattening of the faces, with no slits but those to the targets."""
-        return make_piece(self.surface, ids, self.area, self.config, targets)
+    def weigh(self, ids: NDArray[np.int64], slits: tuple[Slit, ...] = (), goal: float = np.inf) -> Piece | None:
+        """A flattening of the faces, with no slits but those given; None also where it would cost more than goal."""
+        return make_piece(self.surface, ids, self.area, self.config, slits, goal)
 
-    def relieve_all(self) -> None:
-        """Slits where they pay, in all pieces."""
-        self.pieces = {key: self.relieve(piece) for key, piece in self.pieces.items()}
+    def relieve_all(self, above: float, *, contacts: bool = False) -> None:
+        """Slits where they pay, in all pieces of more excess energy than ``above``."""
+        for key, piece in self.pieces.items():
+            if piece.energy > above:
+                self.pieces[key] = self.relieve(piece, contacts=contacts)
 
     def relieve(self, piece: Piece, *, contacts: bool = False) -> Piece:
         """Slit where it pays.  ``contacts``: hold slits apart that would overlap (slow), else leave such slits out."""
@@ -96,22 +103,32 @@ class Regrouping:
         matrix = border_lengths(index[self.label()], len(keys), self.graph) / self.unit
         return {(keys[i], keys[j]): matrix[i, j] for i, j in zip(*np.nonzero(np.triu(matrix)), strict=True)}
 
-    def best_merge(self, excluded: set[int]) -> tuple[float, tuple[int, int], Piece] | None:
-        """The adjacent pair whose merge lowers the objective most (or raises it least): (gain, pair, piece)."""
+    def best_merge(self, excluded: set[int], least: float) -> tuple[float, tuple[int, int], Piece] | None:
+        """The adjacent pair whose merge lowers the objective most, by more than ``least`` (negative: raises it less).
+
+        Returns (gain, pair, merged piece), or None.
+        """
         price = self.config.relief.price
+        borders = self.borders()
+        around = {key: sum(length for pair, length in borders.items() if key in pair) for key in self.pieces}
         best = None
-        for pair, length in self.borders().items():
-            if excluded & set(pair):
+        for pair, length in borders.items():
+            apart = sum(self.pieces[key].cost(price) for key in pair) + price * length
+            if excluded & set(pair) or length < self.config.shared * min(around[key] for key in pair):
                 continue
-            if pair not in self.merges:
-                self.merges[pair] = self.weigh(np.concatenate([self.pieces[k].ids for k in pair]))
-            merged = self.merges[pair]
-            if merged is None:
-                continue
-            gain = sum(self.pieces[k].cost(price) for k in pair) + price * length - merged.cost(price)
-            if best is None or gain > best[0]:
-                best = gain, pair, merged
-        return best
+            merged = self.merged(pair, apart - least)
+            if merged is not None and (best is None or apart - merged.cost(price) > best[0]):
+                best = apart - merged.cost(price), pair, merged
+        return best if best is not None and best[0] > least else None
+
+    def merged(self, pair: tuple[int, int], goal: float) -> Piece | None:
+        """The pair as one piece, weighed once; None where it can't be flattened for less than goal."""
+        known = self.merges.get(pair)
+        if known is not None and (known.piece is not None or goal <= known.goal):
+            return known.piece
+        ids = np.concatenate([self.pieces[key].ids for key in pair])
+        self.merges[pair] = Weighed(self.weigh(ids, goal=goal), goal)
+        return self.merges[pair].piece
 
     def apply_merge(self, pair: tuple[int, int], piece: Piece) -> None:
         """Replace two pieces by one."""
@@ -139,7 +156,7 @@ class Regrouping:
     def search(self, most: int) -> None:
         """Merge down to ``most`` pieces, then split and merge while that pays."""
         while len(self.pieces) > most:
-            found = self.best_merge(set())
+            found = self.best_merge(set(), -0.02) or self.best_merge(set(), -np.inf)
             if found is None:
                 break
             self.apply_merge(found[1], found[2])
@@ -159,8 +176,8 @@ class Regrouping:
         split = self.best_split(key)
         if split is not None and split[0] > 0.0:
             room = len(self.pieces) + len(split[1]) - 1 <= most
-            merge = None if room else self.best_merge({key})
-            if room or (merge is not None and merge[0] + split[0] > 0.0):
+            merge = None if room else self.best_merge({key}, -split[0])
+            if room or merge is not None:
                 del self.pieces[key]
                 for part in split[1]:
                     self.add(part)
@@ -190,7 +207,8 @@ def necks(
 ) -> list[list[NDArray[np.int64]]]:
     """The shortest borders between the faces near a seed and the rest: isolines of the distance, by length / smaller area^½.
 
-    Returns up to ``tries`` splittings, each as two connected parts or more.
+    Where an isoline leaves more than two parts, one of the largest is taken off and the others stay together.
+    Returns up to ``tries`` splittings into two connected parts.
     """
     distance = dual_distance(ids, graph, centroids, seed)
     levels = np.quantile(distance, np.linspace(0.08, 0.92, 22))
@@ -201,10 +219,12 @@ def necks(
     minima = [n for n in range(len(levels)) if quality[n] <= quality[max(n - 2, 0) : n + 3].min()]
     found = []
     for n in sorted(minima, key=lambda n: quality[n])[:tries]:
-        parts = connected_parts(ids, distance <= levels[n], graph)
-        if len(parts) == 2:
-            found.append(parts)
-    return found
+        parts = sorted(connected_parts(ids, distance <= levels[n], graph), key=lambda part: -areas[part].sum())
+        for apart in parts[: min(len(parts) - 1, 2)]:
+            rest = np.setdiff1d(ids, apart)
+            if len(connected_parts(rest, np.zeros(len(rest), dtype=bool), graph)) == 1:
+                found.append([apart, rest])
+    return found[:tries]
 
 
 def inner_pairs(

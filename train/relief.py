@@ -18,6 +18,8 @@ from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_path
 from .flatten import jacobians, symmetric_dirichlet
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from .config import ContactConfig, ReliefConfig
@@ -60,75 +62,118 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
     return load / np.maximum(mass, 1e-300)
 
 
-def slit_to(flat: Flat, target: int, paths: ShortestPaths, table: EdgeTable) -> Flat:
-    """The piece slit along the path tree from its boundary to a vertex; both sides keep their uv."""
-    cut = path_mask(table, [trace_back(paths.parent, target)])
-    faces, old = cut_open(flat.surface.faces, cut, table)
+class Slit(NamedTuple):
+    """A cut inside a piece, by its ends in space: from a border vertex to an inner one."""
+
+    start: NDArray[np.float64]
+    target: NDArray[np.float64]
+
+
+def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
+    """The piece slit along a vertex path that begins or ends on its border; both sides keep their uv."""
+    faces, old = cut_open(flat.surface.faces, path_mask(table, [path]), table)
     pins = {new: flat.pins[vertex] for new, vertex in enumerate(old.tolist()) if vertex in flat.pins}
     return Flat(Surface(flat.surface.vertices[old], faces), flat.uv[old], pins)
 
 
-def border_paths(surface: Surface, table: EdgeTable, config: ReliefConfig) -> ShortestPaths:
-    """Cheapest ways from the boundary to each vertex."""
-    boundary = np.unique(table.edges[table.edge_count == 1])
+def border_paths(surface: Surface, table: EdgeTable, sources: NDArray[np.int64], config: ReliefConfig) -> ShortestPaths:
+    """Cheapest ways from the source vertices (b,) to each vertex."""
     cost = edge_costs(surface, table, config.crease_discount)
-    return shortest_paths(len(surface.vertices), table.edges, cost, boundary)
+    return shortest_paths(len(surface.vertices), table.edges, cost, sources)
 
 
-def next_slit(
-    flat: Flat, spared: list[NDArray[np.float64]], unit: float, config: ReliefConfig
-) -> tuple[Flat, float, NDArray[np.float64]] | None:
-    """The piece slit to its most stressed vertex: (piece, length / unit, that vertex's position), or None.
-
-    ``spared``: points around which (2 · config.radius · unit) no slit is tried.
-    """
-    surface = flat.surface
-    table = edge_table(surface.faces)
-    paths = border_paths(surface, table, config)
-    pressure = stress(flat, table, config.radius * unit)
-    pressure[~(paths.distance >= config.near * unit)] = 0.0
+def most_stressed(
+    flat: Flat,
+    table: EdgeTable,
+    distance: NDArray[np.float64],
+    spared: list[NDArray[np.float64]],
+    reach: float,
+    near: float,
+) -> int | None:
+    """The vertex a slit should lead to: not closer to the border than ``near``, not within 2 · reach of a spared point."""
+    pressure = stress(flat, table, reach)
+    pressure[~(distance >= near)] = 0.0
     for point in spared:
-        pressure[np.linalg.norm(surface.vertices - point, axis=1) < 2.0 * config.radius * unit] = 0.0
+        pressure[np.linalg.norm(flat.surface.vertices - point, axis=1) < 2.0 * reach] = 0.0
     target = int(pressure.argmax())
-    if pressure[target] <= 0.0:
-        return None
-    points = surface.vertices[trace_back(paths.parent, target)]
-    length = float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum()) / unit
-    return slit_to(flat, target, paths, table), length, surface.vertices[target]
+    return target if pressure[target] > 0.0 else None
 
 
-def slit_along(surface: Surface, targets: list[NDArray[np.float64]], config: ReliefConfig) -> Surface:
-    """The piece slit to the vertices nearest to the targets, in their order; targets on its border ask for nothing."""
+def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: ReliefConfig) -> Iterator[list[int]]:
+    """Ways from the border to a vertex: the cheapest, then one from elsewhere, which unrolls to the other side."""
+    sources = np.unique(table.edges[table.edge_count == 1])
+    for _ in range(config.ways):
+        if len(sources) == 0:
+            return
+        paths = border_paths(surface, table, sources, config)
+        if not np.isfinite(paths.distance[target]):
+            return
+        path = trace_back(paths.parent, target)
+        yield path
+        start = surface.vertices[path[-1]]
+        apart = config.apart * path_length(surface, path)
+        sources = sources[np.linalg.norm(surface.vertices[sources] - start, axis=1) > apart]
+
+
+def path_length(surface: Surface, path: list[int]) -> float:
+    """Length of a vertex path, in source units."""
+    points = surface.vertices[path]
+    return float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum())
+
+
+def slit_along(surface: Surface, slits: tuple[Slit, ...], config: ReliefConfig) -> Surface:
+    """The piece with slits made elsewhere: between the vertices nearest to their ends, in their order."""
     flat = Flat(surface, np.zeros((len(surface.vertices), 2)), {})
-    for target in targets:
+    for start, target in slits:
         table = edge_table(flat.surface.faces)
-        paths = border_paths(flat.surface, table, config)
-        nearest = int(np.linalg.norm(flat.surface.vertices - target, axis=1).argmin())
-        flat = slit_to(flat, nearest, paths, table)
+        border = np.unique(table.edges[table.edge_count == 1])
+        points = flat.surface.vertices
+        source = border[np.linalg.norm(points[border] - start, axis=1).argmin()]
+        paths = border_paths(flat.surface, table, np.array([source]), config)
+        # the border itself is no way to cut along: the path leaves it where it last touches it
+        path = trace_back(paths.parent, int(np.linalg.norm(points - target, axis=1).argmin()))
+        on_border = np.flatnonzero(np.isin(path, border))
+        flat = slit_to(flat, path[: int(on_border[0]) + 1] if len(on_border) else path, table)
     return flat.surface
 
 
-def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, list[NDArray[np.float64]]]:
-    """The piece with every slit that pays, and the points they lead to.
+def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, tuple[Slit, ...]]:
+    """The piece with every slit that pays, and those slits.
 
     A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most stressed
     vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
     """
     unit = float(np.sqrt(total_area))
     spared: list[NDArray[np.float64]] = []
-    targets: list[NDArray[np.float64]] = []
+    slits: list[Slit] = []
     energy = excess_energy(flat.surface, flat.uv) / total_area
-    while len(spared) < config.failures and len(targets) < config.most and energy > config.price * config.shortest:
-        found = next_slit(flat, spared, unit, config)
-        if found is None:
+    while len(spared) < config.failures and len(slits) < config.most and energy > config.price * config.shortest:
+        table = edge_table(flat.surface.faces)
+        border = np.unique(table.edges[table.edge_count == 1])
+        distance = border_paths(flat.surface, table, border, config).distance
+        target = most_stressed(flat, table, distance, spared, config.radius * unit, config.near * unit)
+        if target is None:
             break
-        trial, length, point = found
-        needed = energy - config.price * max(length, config.shortest)
-        trial = trial.relaxed(config.contact, goal=needed * total_area)
-        lowered = excess_energy(trial.surface, trial.uv) / total_area
-        if lowered < needed:
-            flat, energy = trial, lowered
-            targets.append(point)
-        else:
+        point = flat.surface.vertices[target]
+        found = best_slit(flat, table, target, energy, total_area, config)
+        if found is None:
             spared.append(point)
-    return flat, targets
+            continue
+        flat, slit = found
+        energy = excess_energy(flat.surface, flat.uv) / total_area
+        slits.append(slit)
+    return flat, tuple(slits)
+
+
+def best_slit(
+    flat: Flat, table: EdgeTable, target: int, energy: float, total_area: float, config: ReliefConfig
+) -> tuple[Flat, Slit] | None:
+    """The first way to slit to a vertex that pays; ``energy`` is the piece's share of excess before."""
+    for path in candidate_paths(flat.surface, table, target, config):
+        length = path_length(flat.surface, path) / float(np.sqrt(total_area))
+        needed = energy - config.price * max(length, config.shortest)
+        trial = slit_to(flat, path, table).relaxed(config.contact, goal=needed * total_area)
+        if excess_energy(trial.surface, trial.uv) < needed * total_area:
+            points = flat.surface.vertices
+            return trial, Slit(points[path[-1]], points[target])
+    return None
