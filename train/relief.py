@@ -128,8 +128,9 @@ def slit_along(surface: Surface, slits: tuple[Slit, ...], config: ReliefConfig) 
         table = edge_table(flat.surface.faces)
         border = np.unique(table.edges[table.edge_count == 1])
         points = flat.surface.vertices
-        source = border[np.linalg.norm(points[border] - start, axis=1).argmin()]
-        paths = border_paths(flat.surface, table, np.array([source]), config)
+        gap = np.linalg.norm(points[border] - start, axis=1)
+        # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
+        paths = border_paths(flat.surface, table, border[gap <= gap.min()], config)
         # the border itself is no way to cut along: the path leaves it where it last touches it
         path = trace_back(paths.parent, int(np.linalg.norm(points - target, axis=1).argmin()))
         on_border = np.flatnonzero(np.isin(path, border))
