@@ -93,6 +93,15 @@ def test_seam_samples_lie_in_their_faces_at_normal_distances_from_the_seam(two_h
     np.testing.assert_allclose(np.histogram(points[:, 1], 7, (-0.7, 0.7))[0], 4000 / 7, rtol=0.2)
 
 
+def test_a_seam_three_times_as_long_gets_three_times_the_samples() -> None:
+    xyz = np.array([[0.0, 0, 0], [3, 0, 0], [0, 1, 0], [0, -2, 0], [-2, 0, 0]])
+    surface = Surface(xyz, np.array([[0, 1, 2], [1, 0, 3], [0, 2, 4]]))
+    charts = charts_by(np.arange(3), surface.triangles[..., :2])
+    points, face = sample_seams(surface, charts, 4000, 0.01, rng())
+    assert (np.abs(points[:, 1]) < np.abs(points[:, 0])).mean() == pytest.approx(0.75, abs=0.02)
+    assert (face == 0).mean() == pytest.approx(0.5, abs=0.03)
+
+
 def test_without_a_seam_there_are_no_seam_samples(sheet: Surface) -> None:
     points, face = sample_seams(sheet, charts_by(np.zeros(200, np.int64), sheet.triangles[..., :2]), 50, 0.02, rng())
     assert points.shape == (0, 3)

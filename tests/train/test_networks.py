@@ -132,6 +132,13 @@ def test_fourier_features_are_sines_and_cosines_of_octaves() -> None:
     torch.testing.assert_close(FourierFeatures(2)(x)[0], torch.tensor(expected), rtol=0.0, atol=1e-6)
 
 
+def test_each_octave_is_the_first_at_twice_the_frequency() -> None:
+    x, features = points(5), FourierFeatures(4)
+    sine, first = features(x)[:, 3:15].reshape(5, 4, 3), FourierFeatures(1)
+    for i in range(4):
+        torch.testing.assert_close(sine[:, i], first(2.0**i * x)[:, 3:6], rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("octaves", [0, 1, 4])
 def test_fourier_channels_are_what_comes_out(octaves: int) -> None:
     features = FourierFeatures(octaves)
