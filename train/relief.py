@@ -101,7 +101,8 @@ def most_stressed(
 
 def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: ReliefConfig) -> Iterator[list[int]]:
     """Ways from the border to a vertex: the cheapest, then one from elsewhere, which unrolls to the other side."""
-    sources = np.unique(table.edges[table.edge_count == 1])
+    border = np.unique(table.edges[table.edge_count == 1])
+    sources = border
     for _ in range(config.ways):
         if len(sources) == 0:
             return
@@ -109,6 +110,8 @@ def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: Rel
         if not np.isfinite(paths.distance[target]):
             return
         path = trace_back(paths.parent, target)
+        # a way that touches the border before its source would cut the piece in two: it starts where it last does
+        path = path[: int(np.isin(path, border).argmax()) + 1]
         yield path
         start = surface.vertices[path[-1]]
         apart = config.apart * path_length(surface, path)
