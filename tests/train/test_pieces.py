@@ -70,7 +70,7 @@ def test_one_triangle_is_its_own_flattening() -> None:
     triangle = Surface(np.array([[0.0, 0, 1], [3, 0, 1], [0, 2, 5]]), np.array([[0, 1, 2]]))
     piece = whole_piece(triangle)
     assert piece.energy == pytest.approx(0.0, abs=1e-6)
-    assert (piece.slits, piece.method, piece.targets) == (0.0, "slim", ())
+    assert (piece.slits, piece.method, piece.relief) == (0.0, "slim", ())
     assert signed_areas(piece.flat.uv[piece.flat.surface.faces]) == pytest.approx(triangle.face_areas(), rel=1e-3)
 
 
@@ -182,7 +182,7 @@ def test_relief_adds_its_slit_to_the_piece() -> None:
     assert_valid(open_, cone)
     assert open_.method == "slit"
     assert open_.slits == pytest.approx(np.hypot(0.5, 1.0) / np.sqrt(area_of(cone)), rel=0.02)
-    assert len(open_.targets) == 1
+    assert len(open_.relief) == 1
     assert open_.cost(PRICE) < plain.cost(PRICE) - 0.1
     assert np.array_equal(open_.ids, plain.ids)
 
@@ -194,15 +194,15 @@ def test_a_piece_without_relief_stays_what_it_is() -> None:
     assert np.array_equal(relieved(piece, area_of(sheet), CONFIG.relief).flat.uv, piece.flat.uv)
 
 
-def test_targets_bring_the_slits_back() -> None:
+def test_relief_slits_can_be_given_to_the_piece_again() -> None:
     cone = sample("cone", 32)
     open_ = relieved(whole_piece(cone), area_of(cone), CONFIG.relief)
-    again = make_piece(cone, open_.ids, area_of(cone), CONFIG, open_.targets)
+    again = make_piece(cone, open_.ids, area_of(cone), CONFIG, open_.relief)
     assert again is not None
     assert_valid(again, cone)
     assert again.slits == pytest.approx(open_.slits)
     assert again.energy == pytest.approx(open_.energy, abs=1e-4)
-    assert len(again.targets) == 1
+    assert len(again.relief) == 1
 
 
 def test_half_of_a_real_mesh_is_a_valid_piece(models: Path) -> None:
