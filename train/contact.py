@@ -1,7 +1,8 @@
-"""Overlap inside one chart, taken apart: boundary vertices that went under another part of the chart are drawn back out.
+"""Overlap inside one chart, taken apart: border vertices that went under another part of the chart are drawn back out.
 
-SLIM rules out flips, not a border that crosses itself.  Each round pins the vertices that lie inside another triangle just
-outside the nearest border, runs SLIM, and asks the exact test again.  The chart is a flip-free piece; uv in source units.
+SLIM rules out flips, not a border that crosses itself.  Each round pins the vertices that lie inside another triangle
+just outside the nearest border, runs SLIM, and asks the exact test again.  The chart is a flip-free piece; uv in source
+units.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def nearest_exit(
 
 
 class Relaxed(NamedTuple):
-    """A valid flattening on its way down.  uv (v, 2): no flips, no overlap.  pins: contacts that hold it apart, by vertex."""
+    """A valid flattening on its way down.  uv (v, 2): no flips, no overlap.  pins: contacts that hold it, by vertex."""
 
     uv: NDArray[np.float64]
     pins: dict[int, NDArray[np.float64]]
@@ -89,7 +90,7 @@ def as_pins(places: dict[int, NDArray[np.float64]], weight: float) -> Pins | Non
 
 
 def rim_overlaps(faces: NDArray[np.int64], edges: NDArray[np.int64], uv: NDArray[np.float64]) -> bool:
-    """True where the border crosses itself.  For a flip-free piece that is overlap: a simple border bounds an injective map.
+    """True where the border crosses itself.  For a flip-free piece that is overlap: a simple border bounds no overlap.
 
     Two border edges that cross belong to two triangles that overlap, so only the triangles along the border are tested.
     """
@@ -116,7 +117,7 @@ def separate(surface: Surface, start: Relaxed, edges: NDArray[np.int64], config:
 
 
 def excess_energy(surface: Surface, uv: NDArray[np.float64]) -> float:
-    """Σ area · (symmetric Dirichlet − 1), each face capped at 10 so that one sliver decides nothing; source units squared."""
+    """Σ area · (symmetric Dirichlet − 1), each face capped at 10 so that no sliver decides; source units squared."""
     return float(surface.face_areas() @ np.minimum(symmetric_dirichlet(jacobians(surface, uv)) - 1.0, 10.0))
 
 
@@ -140,10 +141,10 @@ def converge(surface: Surface, start: Relaxed, goal: float, config: ContactConfi
 
 
 def relax(surface: Surface, start: Relaxed, config: ContactConfig, *, goal: float = np.inf) -> Relaxed:
-    """SLIM from a valid flattening to a valid one: freely first, and where that ends in overlap, in small steps with contacts.
+    """SLIM from a valid flattening to a valid one: freely first; where that ends in overlap, in small steps.
 
-    Returns the start where ``goal`` (excess energy) is out of sight, and the last valid state where contacts can't hold the
-    chart apart; with ``config.rounds`` = 0 there are no contacts.
+    Returns the start where ``goal`` (excess energy) is out of sight, and the last valid state where contacts can't hold
+    the chart apart; with ``config.rounds`` = 0 there are no contacts.
     """
     edges = boundary_edges(surface.faces)
     free = converge(surface, start, goal, config)

@@ -5,6 +5,7 @@ A piece is an oriented manifold: vertices (v, 3), faces (f, 3).  Cuts are edge m
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ShortestPaths(NamedTuple):
-    """Distances and the tree from a set of sources.  distance (v,); parent (v,), −1 at sources and where nothing leads."""
+    """Distances (v,) and the tree from a set of sources: parent (v,), −1 at sources and where nothing leads."""
 
     distance: NDArray[np.float64]
     parent: NDArray[np.int64]
@@ -57,7 +58,7 @@ def path_mask(table: EdgeTable, paths: list[list[int]]) -> NDArray[np.bool_]:
     """(e,) bool: edges on any of the vertex paths."""
     span = int(table.edges.max(initial=0)) + 1
     key = table.edges[:, 0] * span + table.edges[:, 1]
-    steps = [sorted(pair) for path in paths for pair in zip(path, path[1:], strict=False)]
+    steps = [sorted(pair) for path in paths for pair in pairwise(path)]
     wanted = np.array([a * span + b for a, b in steps], dtype=np.int64)
     return np.isin(key, wanted) & table.manifold
 
@@ -65,9 +66,9 @@ def path_mask(table: EdgeTable, paths: list[list[int]]) -> NDArray[np.bool_]:
 def disk_cuts(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.bool_]:
     """(e,) bool: edges that, cut open, leave one disk.  None for a disk.
 
-    Tree-cotree (Eppstein 2003; Erickson & Whittlesey 2005): a shortest-path tree from the boundary (all loops as one source),
-    a maximum spanning tree of the dual graph over the other edges; each edge in neither closes one short path between two
-    boundary loops or around a handle.  A closed piece without handles is slit between two far points instead.
+    Tree-cotree (Eppstein 2003; Erickson & Whittlesey 2005): a shortest-path tree from the boundary (all loops as one
+    source), a maximum spanning tree of the dual graph over the other edges; each edge in neither closes one short path
+    between two boundary loops or around a handle.  A closed piece without handles is slit between two far points.
     """
     cost = edge_costs(surface, table, crease_discount)
     count = len(surface.vertices)

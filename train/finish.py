@@ -84,7 +84,7 @@ def regrouped(surface: Surface, log_probability: LogProbability, charts: int, co
 
 
 def carried_back(surface: Surface, coarse: Surface, found: Regrouping, charts: int, config: FinishConfig) -> Regrouping:
-    """The pieces and slits found on the coarse twin, on the surface itself; merged where validity asked for more pieces."""
+    """The pieces and slits of the coarse twin, on the surface itself; merged where validity asked for more pieces."""
     keys, label = np.unique(found.label(), return_inverse=True)
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.crease_discount)
     areas = surface.face_areas()
@@ -113,6 +113,6 @@ def verify(pieces: list[Piece]) -> None:
         flips, overlaps = int(flipped_triangles(uv).sum()), len(overlapping_pairs(uv))
         if flips or overlaps:
             raise FinishError(
-                f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping pairs, "
-                "expected none; please report the mesh"
+                f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping "
+                "pairs, expected none; please report the mesh"
             )

@@ -1,6 +1,6 @@
 """Flattening one piece: a bijective start on the circle, then SLIM down to low symmetric Dirichlet energy.
 
-Pieces are oriented manifolds over their own vertices.  uv in the units of the surface, so isometry has singular values 1.
+Pieces are oriented manifolds over their own vertices.  uv in the surface's units: isometry has singular values 1.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import igl
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from ..runtime.mesh import Surface
 from ..runtime.overlap import flipped_triangles
@@ -61,9 +61,9 @@ def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]
     Cotangent weights first (close to conformal); where they flip a triangle, uniform ones, which can't (Tutte 1963).
     Scaled to the surface's area.
     """
-    boundary = igl.map_vertices_to_circle(surface.vertices, loop)
+    boundary = np.asarray(igl.map_vertices_to_circle(surface.vertices, loop), dtype=np.float64)
     faces = np.asfortranarray(surface.faces)
-    uv = igl.harmonic(np.asfortranarray(surface.vertices), faces, loop, boundary, 1)
+    uv = np.asarray(igl.harmonic(np.asfortranarray(surface.vertices), faces, loop, boundary, 1), dtype=np.float64)
     if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
         uv = tutte_map(surface, loop, boundary)
     return uv * np.sqrt(surface.face_areas().sum() / np.pi)
@@ -85,7 +85,7 @@ def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.fl
     uv[loop] = boundary
     if len(inner):
         rows = laplacian.tocsr()[inner]
-        uv[inner] = spsolve(rows[:, inner].tocsc(), -(rows[:, loop] @ boundary)).reshape(-1, 2)
+        uv[inner] = splu(rows[:, inner].tocsc()).solve(-(rows[:, loop] @ boundary))
     return uv
 
 
@@ -140,7 +140,7 @@ def sorted_loops(surface: Surface) -> list[NDArray[np.int64]]:
 
 
 def flatten(surface: Surface, iterations: int) -> NDArray[np.float64]:
-    """Uv (v, 2) of a piece of disk topology, holes allowed: they are filled while SLIM runs, so they stay open and simple."""
+    """Uv (v, 2) of a disk, holes allowed: they are filled while SLIM runs, so they stay open and simple."""
     outer, *holes = sorted_loops(surface)
     filled = fill_holes(surface, holes)
     uv = slim(filled, circle_map(filled, outer), iterations)

@@ -1,6 +1,6 @@
 """Face labels: from chart probabilities to at most K connected pieces with short seams along creases.
 
-f faces · k labels · a *dual graph* joins faces across the mesh's interior edges: pairs (m, 2), seam cost (m,) in lengths.
+f faces · k labels · a *dual graph* joins faces across interior edges: pairs (m, 2), seam cost (m,) in lengths.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class DualGraph(NamedTuple):
-    """Faces joined across manifold interior edges.  pairs (m, 2) int64; length (m,) edge length; cost (m,) what a seam there costs."""
+    """Faces joined across manifold edges.  pairs (m, 2) int64; length (m,) of the edges; cost (m,) of a seam there."""
 
     pairs: NDArray[np.int64]
     length: NDArray[np.float64]
@@ -31,8 +31,8 @@ def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> Du
     """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
 
     The discount follows 1 − |cos(half the dihedral deviation)|-like growth: none on flat ground, full from 60° on.
-    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join nothing: the surface
-    is cut there anyway.
+    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join nothing: the
+    surface is cut there anyway.
     """
     inside = np.flatnonzero(table.manifold)
     pairs = table.edge_faces[inside]
@@ -103,7 +103,7 @@ def minimum_cut(
     free: NDArray[np.bool_],
     capacity: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Which free faces switch (m,): minimises Σ keep/take costs + Σ capacity where the first keeps and the second switches."""
+    """Which free faces switch (m,): least Σ keep/take costs + Σ capacity where only the second switches."""
     number = np.cumsum(free) - 1
     size = len(keep)
     source, sink = size, size + 1
@@ -139,7 +139,8 @@ def merge_pieces(
 ) -> NDArray[np.int64]:
     """Pieces (f,), numbered 0…: islets and whatever exceeds ``most`` pieces a component joins its longest neighbour.
 
-    A piece that is a whole connected component has no neighbour and stays; each component beyond the first raises the limit by one.
+    A piece that is a whole connected component has no neighbour and stays; each component beyond the first raises the
+    limit by one.
     """
     piece = connected_pieces(label, graph)
     component = connected_pieces(np.zeros_like(label), graph)
@@ -165,4 +166,4 @@ def border_lengths(piece: NDArray[np.int64], count: int, graph: DualGraph) -> ND
     apart = i != j
     i, j, length = i[apart], j[apart], graph.length[apart]
     matrix = np.bincount(i * count + j, length, minlength=count * count).reshape(count, count)
-    return matrix + matrix.T
+    return (matrix + matrix.T).astype(np.float64)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class Piece:
     """A set of faces and its valid flattening.
 
-    ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the area of the whole surface.
+    ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
     slits: length of the cuts inside the piece, in √A.  relief: the relief slits, in their order.
     """
 
@@ -76,9 +76,9 @@ def openings(piece: Surface, crease_discount: float) -> Iterator[Surface]:
 def flattened(piece: Surface, config: ContactConfig, goal: float) -> NDArray[np.float64] | None:
     """The uv (v, 2) of a disk, holes allowed, after SLIM: without flips and overlap.
 
-    None where that can't be had, or where ``goal`` (excess energy, source units squared) is out of sight.  Holes are filled
-    while SLIM runs, so that they stay open.  The circle map is valid and SLIM leaves it step by step, so where the end
-    overlaps, early states are tried.
+    None where that can't be had, or where ``goal`` (excess energy, source units squared) is out of sight.  Holes are
+    filled while SLIM runs, so that they stay open.  The circle map is valid and SLIM leaves it step by step, so where
+    the end overlaps, early states are tried.
     """
     outer, *holes = sorted_loops(piece)
     filled = fill_holes(piece, holes)

@@ -1,7 +1,7 @@
 """Split and merge: chart borders moved to where they pay, under the limit on the number of charts.
 
-Objective: Σ area · excess + price · (seams + slits), areas and lengths as shares of the surface.  A merge saves the border
-between two charts; a split costs one and frees what could not be flattened: a limb at its neck.
+Objective: Σ area · excess + price · (seams + slits), areas and lengths as shares of the surface.  A merge saves the
+border between two charts; a split costs one and frees what could not be flattened: a limb at its neck.
 """
 
 from __future__ import annotations
@@ -101,7 +101,8 @@ class Regrouping:
         index = np.zeros(self._next, dtype=np.int64)
         index[keys] = np.arange(len(keys))
         matrix = border_lengths(index[self.label()], len(keys), self.graph) / self.unit
-        return {(keys[i], keys[j]): matrix[i, j] for i, j in zip(*np.nonzero(np.triu(matrix)), strict=True)}
+        adjacent = np.argwhere(np.triu(matrix) > 0.0).tolist()
+        return {(keys[i], keys[j]): float(matrix[i, j]) for i, j in adjacent}
 
     def best_merge(self, excluded: set[int], least: float) -> tuple[float, tuple[int, int], Piece] | None:
         """The adjacent pair whose merge lowers the objective most, by more than ``least`` (negative: raises it less).
@@ -127,14 +128,20 @@ class Regrouping:
         if known is not None and (known.piece is not None or goal <= known.goal):
             return known.piece
         ids = np.concatenate([self.pieces[key].ids for key in pair])
-        self.merges[pair] = Weighed(self.weigh(ids, goal=goal), goal)
-        return self.merges[pair].piece
+        smaller = min(self.areas[self.pieces[key].ids].sum() for key in pair) / self.area
+        if smaller < self.config.bump:  # a bump on a big piece flattens only once it is slit, and such slits are cheap
+            goal = np.inf
+        piece = self.weigh(ids, goal=goal)
+        if piece is not None and smaller < self.config.bump:
+            piece = self.relieve(piece)
+        self.merges[pair] = Weighed(piece, goal)
+        return piece
 
     def apply_merge(self, pair: tuple[int, int], piece: Piece) -> None:
         """Replace two pieces by one."""
         for key in pair:
             del self.pieces[key]
-        self.add(self.relieve(piece))
+        self.add(piece if piece.relief else self.relieve(piece))
 
     def best_split(self, key: int) -> tuple[float, list[Piece]] | None:
         """The best way found to halve a piece: (gain, parts)."""
@@ -205,7 +212,7 @@ def necks(
     seed: int,
     tries: int,
 ) -> list[list[NDArray[np.int64]]]:
-    """The shortest borders between the faces near a seed and the rest: isolines of the distance, by length / smaller area^½.
+    """The shortest borders between the faces near a seed and the rest: isolines of distance, by length / √smaller area.
 
     Where an isoline leaves more than two parts, one of the largest is taken off and the others stay together.
     Returns up to ``tries`` splittings into two connected parts.

@@ -1,6 +1,6 @@
 """Relief cuts: a chart that no disk can carry without stretch is slit from its border to where it hurts.
 
-A cut leaves the flattening as it is (both sides keep their uv), so SLIM goes on from there, flip-free, and opens the slit.
+A cut leaves the flattening as it is (both sides keep their uv), so SLIM goes on from there and opens the slit.
 Lengths and areas are shares: length / √(area of the whole surface), area / (area of the whole surface).
 """
 
@@ -33,7 +33,7 @@ class Flat(NamedTuple):
     pins: dict[int, NDArray[np.float64]]
 
     def relaxed(self, config: ContactConfig, *, goal: float = np.inf) -> Flat:
-        """The piece after SLIM, still valid; unchanged where the goal (excess energy, source units squared) is out of sight."""
+        """The piece after SLIM, still valid; unchanged where the goal (excess energy) is out of sight."""
         state = relax(self.surface, Relaxed(self.uv, self.pins), config, goal=goal)
         return self._replace(uv=state.uv, pins=state.pins)
 
@@ -90,7 +90,7 @@ def most_stressed(
     reach: float,
     near: float,
 ) -> int | None:
-    """The vertex a slit should lead to: not closer to the border than ``near``, not within 2 · reach of a spared point."""
+    """The vertex a slit should lead to: no closer to the border than ``near``, and 2 · reach from spared points."""
     pressure = stress(flat, table, reach)
     pressure[~(distance >= near)] = 0.0
     for point in spared:
@@ -144,8 +144,8 @@ def slit_along(surface: Surface, slits: tuple[Slit, ...], config: ReliefConfig) 
 def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, tuple[Slit, ...]]:
     """The piece with every slit that pays, and those slits.
 
-    A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most stressed
-    vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
+    A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most
+    stressed vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
     """
     unit = float(np.sqrt(total_area))
     spared: list[NDArray[np.float64]] = []

@@ -1,6 +1,6 @@
 """A simplified twin of a surface for decisions that need no detail, and the way of its labels back.
 
-Splitting and merging weighs dozens of flattenings; on a few thousand faces each takes hundredths of a second whatever the mesh.
+Splitting and merging weighs dozens of flattenings; on a few thousand faces each takes hundredths of a second.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import igl
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ..runtime.mesh import Surface
 from ..runtime.topology import split_non_manifold_vertices
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def simplified(surface: Surface, faces: int) -> Surface:
-    """About ``faces`` faces by quadric error (Garland & Heckbert 1997, libigl); the surface itself where that can't be had.
+    """About ``faces`` faces by quadric error (Garland & Heckbert 1997, libigl); the surface where that can't be had.
 
     Non-manifold edges and vertices are cut apart first, as they are for flattening.
     """
@@ -27,10 +27,11 @@ def simplified(surface: Surface, faces: int) -> Surface:
         return surface
     manifold, old = split_non_manifold_vertices(surface.faces)
     vertices = np.asfortranarray(surface.vertices[old])
-    coarse, triangles, _, _ = igl.qslim(vertices, np.asfortranarray(manifold.astype(np.int32)), faces)
+    found = igl.qslim(vertices, np.asfortranarray(manifold.astype(np.int32)), faces)
+    coarse, triangles = np.asarray(found[0], dtype=np.float64), np.asarray(found[1], dtype=np.int64)
     if len(triangles) == 0:
         return surface
-    solid = np.linalg.norm(np.cross(*(coarse[triangles[:, i]] - coarse[triangles[:, 0]] for i in (1, 2))), axis=1) > 0.0
+    solid = Surface(coarse, triangles).face_areas() > 0.0
     used, index = np.unique(triangles[solid], return_inverse=True)
     return Surface(np.ascontiguousarray(coarse[used]), index.reshape(-1, 3).astype(np.int64))
 
@@ -43,6 +44,6 @@ def carry_labels(
     def feature(of: Surface) -> NDArray[np.float64]:
         return np.concatenate([of.triangles.mean(axis=1), normal_weight * of.face_normals()], axis=1)
 
-    nearest = cKDTree(feature(coarse)).query(feature(surface), k=range(1, neighbours + 1))[1]
-    votes = label[nearest]
+    nearest = KDTree(feature(coarse)).query(feature(surface), k=neighbours)[1]
+    votes = label[np.reshape(nearest, (len(surface.faces), neighbours))]
     return np.stack([(votes == k).mean(axis=1) for k in range(int(label.max()) + 1)], axis=1)
