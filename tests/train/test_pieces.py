@@ -206,7 +206,7 @@ def test_relief_slits_can_be_given_to_the_piece_again() -> None:
 
 
 def test_half_of_a_real_mesh_is_a_valid_piece(models: Path) -> None:
-    surface = load_asset(models / "spot.obj").surface
+    surface = load_asset(models / "suzanne.obj").surface
     surface = Surface(Frame.of(surface.vertices).apply(surface.vertices), surface.faces)
     side = surface.triangles.mean(axis=1)[:, 0] > 0.0
     part = components(surface.faces[side])

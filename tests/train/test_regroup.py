@@ -254,7 +254,7 @@ def test_the_search_never_ends_worse_than_it_began_where_there_is_room() -> None
 
 
 def test_components_are_never_merged() -> None:
-    sphere = sample("sphere", 8)
+    sphere = sample("sphere", 5)
     vertices = np.concatenate([sphere.vertices, sphere.vertices + FAR_APART])
     both = Surface(vertices, np.concatenate([sphere.faces, sphere.faces + len(sphere.vertices)]))
     search = search_of(both, np.zeros(len(both.faces), dtype=np.int64))
