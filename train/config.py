@@ -72,21 +72,21 @@ class LabelConfig:
 class ContactConfig:
     """Taking overlap inside a chart apart."""
 
-    rounds: int = 6
+    rounds: int = 10
     """Rounds of pinning, SLIM and the exact test."""
     iterations: int = 2
     """SLIM iterations a round."""
-    block: int = 10
+    block: int = 5
     """SLIM iterations between two looks at the energy."""
-    blocks: int = 6
+    blocks: int = 10
     """Blocks at most."""
-    still: float = 0.05
+    still: float = 0.04
     """A block that lowers the energy by less than this share ends the run."""
-    patience: float = 2.0
+    patience: float = 3.0
     """How many more drops like the last one a block is trusted with."""
     step: int = 3
     """SLIM iterations between two tests where contacts are needed."""
-    steps: int = 4
+    steps: int = 5
     """Such steps at most."""
     margin: float = 0.01
     """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
@@ -128,7 +128,7 @@ class FinishConfig:
 
     labels: LabelConfig = field(default_factory=LabelConfig)
     relief: ReliefConfig = field(default_factory=ReliefConfig)
-    surrogate_faces: int = 4000
+    surrogate_faces: int = 2500
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
@@ -136,6 +136,8 @@ class FinishConfig:
     """Borders tried for each split and seed."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
+    bump: float = 0.03
+    """Share of the surface under which a piece is a bump: a merge with it is weighed with slits."""
     dear: float = 0.01
     """Excess energy over which a finished piece is slit once more, with contacts."""
 

@@ -128,14 +128,20 @@ class Regrouping:
         if known is not None and (known.piece is not None or goal <= known.goal):
             return known.piece
         ids = np.concatenate([self.pieces[key].ids for key in pair])
-        self.merges[pair] = Weighed(self.weigh(ids, goal=goal), goal)
-        return self.merges[pair].piece
+        smaller = min(self.areas[self.pieces[key].ids].sum() for key in pair) / self.area
+        if smaller < self.config.bump:  # a bump on a big piece flattens only once it is slit, and such slits are cheap
+            goal = np.inf
+        piece = self.weigh(ids, goal=goal)
+        if piece is not None and smaller < self.config.bump:
+            piece = self.relieve(piece)
+        self.merges[pair] = Weighed(piece, goal)
+        return piece
 
     def apply_merge(self, pair: tuple[int, int], piece: Piece) -> None:
         """Replace two pieces by one."""
         for key in pair:
             del self.pieces[key]
-        self.add(self.relieve(piece))
+        self.add(piece if piece.relief else self.relieve(piece))
 
     def best_split(self, key: int) -> tuple[float, list[Piece]] | None:
         """The best way found to halve a piece: (gain, parts)."""
