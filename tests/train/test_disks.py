@@ -176,6 +176,18 @@ def test_any_solid_becomes_one_disk(name: str, discount: float) -> None:
     assert_disk(cut(sample(name, 24), discount)[0])
 
 
+@pytest.mark.parametrize("first", [0, 6, 51, 174])
+def test_no_cut_through_handles_has_a_dead_end(first: int) -> None:
+    """Wherever the vertex at which all loops begin may lie: on a bracket, loops share a crease on their way out."""
+    pytest.importorskip("manifold3d")
+    bracket = sample("bracket", 24)
+    order = np.roll(np.arange(len(bracket.vertices)), -first)
+    surface = Surface(bracket.vertices[order], np.argsort(order)[bracket.faces])
+    table = edge_table(surface.faces)
+    assert (np.bincount(table.edges[disk_cuts(surface, table, 0.8)].reshape(-1)) != 1).all()
+    assert_disk(cut(surface, 0.8)[0])
+
+
 def test_the_smallest_closed_surface_becomes_a_disk() -> None:
     assert_disk(cut(TETRAHEDRON)[0])
 

@@ -20,9 +20,10 @@ from flexpara.runtime.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.samples import make_sample
 from flexpara.runtime.topology import components, edge_table, is_manifold
 from flexpara.train.config import FinishConfig
-from flexpara.train.finish import Finished, component_count, finish, verify
+from flexpara.train.finish import Finished, carried_back, component_count, finish, regrouped, verify
 from flexpara.train.labels import dual_graph
 from flexpara.train.pieces import make_piece
+from flexpara.train.regroup import Regrouping
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -231,6 +232,26 @@ def test_the_exact_check_refuses_flips_and_overlaps() -> None:
     folded[:, 0] = np.abs(folded[:, 0] - np.median(folded[:, 0]))
     with pytest.raises(FinishError, match="overlapping pairs"):
         verify([replace(piece, flat=piece.flat._replace(uv=folded))])
+
+
+def test_a_flip_that_slips_in_is_never_returned(monkeypatch: pytest.MonkeyPatch) -> None:
+    def mirror(search: Regrouping, *_: object, **__: object) -> None:
+        for key, piece in search.pieces.items():
+            search.pieces[key] = replace(piece, flat=piece.flat._replace(uv=piece.flat.uv * [1.0, -1.0]))
+
+    monkeypatch.setattr(Regrouping, "relieve_all", mirror)
+    with pytest.raises(FinishError, match="flipped triangles"):
+        finished(sample("cloth", 6), 1)
+
+
+def test_the_limit_holds_on_the_surface_itself_too() -> None:
+    """Though the twin left more charts than that."""
+    surface, twin = sample("sphere", 24), sample("sphere", 12)
+    found = regrouped(twin, voronoi(6), 6, replace(CONFIG, rounds=0))
+    assert len(found.pieces) > 2
+    carried = carried_back(surface, twin, found, 2, CONFIG)
+    assert len(carried.pieces) == 2
+    assert_finished(surface, Finished(sorted(carried.pieces.values(), key=lambda piece: int(piece.ids.min())), 0.0), 2)
 
 
 def test_a_real_mesh_finishes_with_eight_charts(models: Path) -> None:
