@@ -125,7 +125,7 @@ def flexpara_row(path: Path, asset: Asset, arguments: argparse.Namespace, folder
     row = measured(asset, made.uv[made.faces])
     row |= {"seconds": statistics.median(run[0] for run in runs), "peak_mb": max(run[1] for run in runs)}
     rms = float("inf") if network["rms_texels"] is None else network["rms_texels"]
-    return row | {"rms_texels": rms, "agreement": network["chart_agreement"]}
+    return row | {"rms_texels": rms, "agreement": min(network["chart_agreement"], network["seam_agreement"])}
 
 
 def judge(row: Row, arguments: argparse.Namespace) -> list[str]:

@@ -16,11 +16,11 @@ class NetConfig:
     """Channels of the hidden layers of embedding, Unwrap- and Wrap-Nets."""
     assign_width: int = 128
     """Hidden channels of the deployed Assign-Net, which has to follow seams along mesh edges."""
-    assign_depth: int = 3
+    assign_depth: int = 2
     """Hidden layers of the deployed Assign-Net."""
     octaves: int = 5
     """Fourier octaves of the deployed Assign-Net's input."""
-    unwrap_octaves: int = 2
+    unwrap_octaves: int = 1
     """Fourier octaves of the deployed Unwrap-Nets' input."""
 
 
@@ -34,7 +34,7 @@ class StartConfig:
     """Weight of the unit normal against the position in the clustering distance."""
     rounds: int = 12
     """Lloyd iterations."""
-    fit_steps: int = 200
+    fit_steps: int = 100
     """Steps of fitting the networks to cluster labels and plane projections."""
 
 
@@ -42,7 +42,7 @@ class StartConfig:
 class JointConfig:
     """Joint training: the paper's score-weighted losses."""
 
-    steps: int = 400
+    steps: int = 100
     """Optimizer steps."""
     batch: int = 1024
     """Surface samples a step."""
@@ -156,7 +156,9 @@ class PatchConfig:
     """uv distance per distance in space that counts as smooth."""
     gap: float = 0.03
     """uv distance beyond that which counts as a tear."""
-    most: int = 8
+    largest: float = 0.5
+    """Area (unit ball) above which a patch is halved: one small network answers for so much to a texel."""
+    most: int = 24
     """Patches a chart may have."""
 
 
@@ -166,19 +168,19 @@ class FitConfig:
 
     samples: int = 60000
     """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
-    unwrap_steps: int = 500
+    unwrap_steps: int = 150
     """Optimizer steps of the Unwrap-Nets."""
-    unwrap_batch: int = 256
+    unwrap_batch: int = 128
     """Samples a step and patch."""
     assign_steps: int = 600
     """Optimizer steps of the Assign-Net."""
-    assign_batch: int = 2048
+    assign_batch: int = 1024
     """Samples a step."""
     seam_share: float = 0.6
     """Share of the Assign-Net's samples that lie close to seams."""
-    seam_reach: float = 0.02
+    seam_reach: float = 0.008
     """Standard deviation of their distance from the seam."""
-    rate: float = 5e-3
+    rate: float = 1e-2
     """Peak learning rate."""
 
 

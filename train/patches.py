@@ -46,12 +46,15 @@ def split_into_patches(piece: Piece, config: PatchConfig) -> NDArray[np.int64]:
     """Patch (m,), numbered from 0, of each face of a piece."""
     flat = piece.flat.surface
     links = joined_faces(flat.faces, flat.triangles.mean(axis=1), rings=config.rings)
-    probes = probe_piece(piece, config)
+    probes, areas = probe_piece(piece, config), flat.face_areas()
     patch = np.zeros(len(flat.faces), dtype=np.int64)
     open_patches, count = [0], 1
     while open_patches and count < config.most:
         members = np.flatnonzero(patch == open_patches[-1])
-        conflict = worst_conflict(probes.among(patch[probes.face] == open_patches[-1]), config)
+        inside_patch = probes.among(patch[probes.face] == open_patches[-1])
+        conflict = worst_conflict(inside_patch, config)
+        if conflict is None and areas[members].sum() > config.largest:
+            conflict = far_ends(inside_patch)
         if conflict is None:
             open_patches.pop()
             continue
@@ -62,6 +65,16 @@ def split_into_patches(piece: Piece, config: PatchConfig) -> NDArray[np.int64]:
         open_patches.append(count)
         count += 1
     return patch
+
+
+def far_ends(probes: Probes) -> Conflict | None:
+    """The two faces at the ends of a patch in uv, along its longest direction; None where that is one face."""
+    if len(probes.uv) < 2:
+        return None
+    centred = probes.uv - probes.uv.mean(axis=0)
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    first, second = (int(probes.face[i]) for i in (along.argmin(), along.argmax()))
+    return Conflict(first, second) if first != second else None
 
 
 def probe_piece(piece: Piece, config: PatchConfig) -> Probes:

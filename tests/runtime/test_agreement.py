@@ -76,3 +76,46 @@ def test_with_no_right_chart_there_is_no_distance() -> None:
     found = agreement(ShiftedMap(wrong_above=-1.0), SQUARE)
     assert found.chart_agreement == 0.0
     assert found.rms_texels is None
+
+
+@dataclass
+class SlitMap:
+    """The square folded open along its diagonal inside one chart; points near the diagonal get the other side's uv."""
+
+    near: float
+
+    def unwrap(self, points: NDArray[np.float64]) -> Unwrapped:
+        above = points[:, 1] > points[:, 0]
+        side = np.where(np.abs(points[:, 1] - points[:, 0]) < self.near, ~above, above)
+        uv = points[:, :2] * 0.4 + np.where(side, 0.5, 0.0)[:, None]
+        return Unwrapped(uv.astype(np.float32), np.zeros(len(points), np.int64), np.ones(len(points), np.float32))
+
+
+def slit_square() -> Atlas:
+    """Two triangles of one chart whose uv lie apart: the diagonal is a slit."""
+    corners = np.concatenate([CORNERS[[0, 1, 2]], CORNERS[[0, 2, 3]]])
+    uv = corners[:, :2] * 0.4 + np.repeat([0.0, 0.5], 3)[:, None]
+    return Atlas(
+        positions=corners,
+        faces=np.array([[0, 1, 2], [3, 4, 5]]),
+        uv=uv.astype(np.float32),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (6, 1)),
+        face_chart=np.array([0, 0]),
+        source_vertex=np.array([0, 1, 2, 0, 2, 3]),
+        size=2048,
+        padding=0,
+    )
+
+
+def test_the_wrong_side_of_a_slit_lowers_the_seam_agreement_alone() -> None:
+    found = agreement(SlitMap(near=0.003), slit_square())
+    assert found.chart_agreement == 1.0
+    assert found.seam_agreement == pytest.approx(1.0 - 0.006, abs=0.001)
+    assert found.rms_texels == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_wrong_answer_far_from_any_seam_stays_in_the_distance() -> None:
+    found = agreement(SlitMap(near=0.1), slit_square())
+    assert found.seam_agreement > 0.97
+    assert found.rms_texels is not None
+    assert found.rms_texels > 100.0
