@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .session import Unwrapped
 
 TEXELS = 1024.0
-SEAM_REACH = 4.0
+SEAM_REACH = 12.0
 """A point this close to a seam (texels at 1024²) may be taken for one on its other side."""
 
 
@@ -67,7 +67,7 @@ def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: i
     distance = np.linalg.norm(answer.uv - uv, axis=1) * TEXELS
     far = np.flatnonzero(right & (distance > 2.0 * SEAM_REACH))
     same_side = right.copy()
-    same_side[far] = ~across_a_seam(atlas, points[far], answer.uv[far].astype(np.float64))
+    same_side[far] = ~across_a_seam(atlas, points[far], answer.uv[far].astype(np.float64), distance[far])
     kept = distance[same_side]
     return Agreement(
         rms_texels=float(np.sqrt(np.mean(kept**2))) if len(kept) else None,
@@ -78,8 +78,13 @@ def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: i
     )
 
 
-def across_a_seam(atlas: Atlas, points: NDArray[np.float64], answer: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) bool: the answer uv (n, 2) fits a seam point that lies within SEAM_REACH texels of the point (n, 3) in space."""
+def across_a_seam(
+    atlas: Atlas, points: NDArray[np.float64], answer: NDArray[np.float64], error: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(n,) bool: the answer uv (n, 2) fits a seam point near the point (n, 3) at least twice as well as the point itself.
+
+    Near: within SEAM_REACH texels in space.  error (n,): distance of the answer from the point's own uv, texels.
+    """
     if len(points) == 0:
         return np.zeros(0, dtype=bool)
     corner, flat = atlas.positions[atlas.faces], atlas.corner_uv
@@ -97,7 +102,7 @@ def across_a_seam(atlas: Atlas, points: NDArray[np.float64], answer: NDArray[np.
     gaps = (
         np.linalg.norm(seam_uv[index] - uv, axis=1).min(initial=np.inf) for index, uv in zip(near, answer, strict=True)
     )
-    return np.fromiter(gaps, dtype=np.float64, count=len(points)) * TEXELS < 2.0 * SEAM_REACH
+    return np.fromiter(gaps, dtype=np.float64, count=len(points)) * TEXELS < 0.5 * error
 
 
 def surface_points(

@@ -18,7 +18,7 @@ class NetConfig:
     """Hidden channels of the deployed Assign-Net, which has to follow seams along mesh edges."""
     assign_depth: int = 2
     """Hidden layers of the deployed Assign-Net."""
-    octaves: int = 5
+    octaves: int = 6
     """Fourier octaves of the deployed Assign-Net's input."""
     unwrap_octaves: int = 1
     """Fourier octaves of the deployed Unwrap-Nets' input."""
@@ -44,7 +44,7 @@ class JointConfig:
 
     steps: int = 100
     """Optimizer steps."""
-    batch: int = 1024
+    batch: int = 512
     """Surface samples a step."""
     peak_rate: float = 4e-3
     """Peak learning rate of the one-cycle schedule (AdamW)."""
@@ -64,7 +64,7 @@ class LabelConfig:
     """Length that a seam may save before a face leaves its most probable chart, per unit of −log probability."""
     crease_discount: float = 0.8
     """How much cheaper a seam is along a sharp crease, in [0, 1)."""
-    islet_area: float = 0.004
+    islet_area: float = 0.008
     """Pieces below this share of the surface join a neighbour."""
 
 
@@ -132,6 +132,10 @@ class FinishConfig:
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
+    stubborn: int = 3
+    """Charts that no split improves, before the search ends."""
+    halvings: int = 8
+    """Times faces that can't be flattened are halved before xatlas gets them."""
     necks: int = 2
     """Borders tried for each split and seed."""
     shared: float = 0.1
@@ -180,6 +184,8 @@ class FitConfig:
     """Share of the Assign-Net's samples that lie close to seams."""
     seam_reach: float = 0.008
     """Standard deviation of their distance from the seam."""
+    tolerance: float = 0.002
+    """uv error, as a share of √(total uv area), up to which another patch of the chart is a right answer too."""
     rate: float = 1e-2
     """Peak learning rate."""
 

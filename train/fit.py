@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from ..runtime.topology import edge_table
-from .joint import one_cycle
+from .optimizer import OneCycleAdam
 from .networks import AtlasNetworks
 from .sampling import sample_surface
 
@@ -56,16 +56,13 @@ def fit_unwrap(
 ) -> None:
     """Least squares on uv; the last layers are solved for exactly at the end, and take the chart's own units."""
     patches, count = samples.xyz.shape[:2]
-    optimizer, schedule = one_cycle(networks.unwrap, config.unwrap_steps, config.rate)
+    optimizer = OneCycleAdam(networks.unwrap, config.unwrap_steps, config.rate)
     rows = torch.arange(patches)[:, None]
     for step in range(config.unwrap_steps):
         pick = torch.randint(count, (patches, config.unwrap_batch), generator=generator)
         flat = networks.unwrap(networks.unwrap_features(samples.xyz[rows, pick]))
         loss = ((flat - samples.uv[rows, pick]) ** 2).mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
+        optimizer.step(loss)
         if step % 25 == 0:
             progress("fit uv", step, config.unwrap_steps, loss.item())
     solve_last_layer(networks, samples)
@@ -92,26 +89,28 @@ def solve_last_layer(networks: AtlasNetworks, samples: PatchSamples) -> None:
 
 def sample_seams(
     surface: Surface, charts: Charts, count: int, reach: float, rng: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points (count, 3) beside seams, at normally distributed distances, and their faces (count,).
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Points beside seams, at normally distributed distances: their faces (count,) and barycentrics (count, 3).
 
     No points where there is no seam.
     """
     half = seam_halfedges(surface, charts)
     if len(half) == 0:
-        return np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
     face, corner = half // 3, half % 3
     corners = surface.triangles[face]
     row = np.arange(len(half))
-    a, b, c = (corners[row, (corner + i) % 3] for i in range(3))
+    a, b = corners[row, corner], corners[row, (corner + 1) % 3]
     length = np.linalg.norm(b - a, axis=1)
     height = 2.0 * surface.face_areas()[face] / np.maximum(length, 1e-300)
     cumulative = np.cumsum(length)
     pick = np.searchsorted(cumulative, rng.random(count) * cumulative[-1]).clip(max=len(half) - 1)
-    depth = np.minimum(np.abs(rng.normal(size=count)) * reach / np.maximum(height[pick], 1e-300), 1.0)[:, None]
-    along = rng.random(count)[:, None]
-    points = (a[pick] * (1.0 - along) + b[pick] * along) * (1.0 - depth) + c[pick] * depth
-    return points, face[pick]
+    depth = np.minimum(np.abs(rng.normal(size=count)) * reach / np.maximum(height[pick], 1e-300), 1.0)
+    along = rng.random(count)
+    barycentric = np.zeros((count, 3))
+    for i, weight in enumerate(((1.0 - along) * (1.0 - depth), along * (1.0 - depth), depth)):
+        barycentric[np.arange(count), (corner[pick] + i) % 3] = weight
+    return face[pick], barycentric
 
 
 def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:
@@ -126,6 +125,32 @@ def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:
     return half[apart].reshape(-1)
 
 
+@torch.no_grad()
+def right_answers(
+    networks: AtlasNetworks,
+    charts: Charts,
+    xyz: Tensor,
+    face: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    tolerance: float,
+) -> Tensor:
+    """(n, p) share of the right answer for each patch: ∝ exp(−(uv error / tolerance)²) over the patches of the face's chart.
+
+    ``tolerance`` is a share of the charts' extent, √(total uv area).
+    """
+    corner = charts.corner_uv
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    extent = np.sqrt(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
+    truth = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, corner[face]).astype(np.float32))
+    chart = torch.from_numpy(charts.patch_chart)
+    same = chart[None] == torch.from_numpy(charts.face_chart[face])[:, None]
+    error = torch.cat(
+        [(networks(x)[1] - t[:, None]).norm(dim=-1) for x, t in zip(xyz.split(4096), truth.split(4096), strict=True)]
+    )
+    closeness = -((error / (tolerance * float(extent))) ** 2)
+    return torch.softmax(closeness.masked_fill(~same, -torch.inf), dim=-1)
+
+
 def fit_assign(
     networks: AtlasNetworks,
     surface: Surface,
@@ -134,20 +159,23 @@ def fit_assign(
     generators: tuple[np.random.Generator, torch.Generator],
     progress: Progress,
 ) -> None:
-    """Cross-entropy on the patch, most samples close to the seams."""
+    """Cross-entropy on the patch, most samples close to the seams.
+
+    Where several patches of the right chart give the right uv, each is a right answer: the borders inside a chart that are no
+    cuts may lie anywhere, and all of the network's precision goes to the seams.
+    """
     rng, generator = generators
     uniform = sample_surface(surface, int(config.samples * (1.0 - config.seam_share)), rng)
-    near, near_face = sample_seams(surface, charts, int(config.samples * config.seam_share), config.seam_reach, rng)
-    xyz = torch.from_numpy(np.concatenate([uniform.xyz, near]).astype(np.float32))
-    label = torch.from_numpy(charts.face_patch[np.concatenate([uniform.face, near_face])])
-    optimizer, schedule = one_cycle(networks.assign, config.assign_steps, config.rate)
+    near_face, near = sample_seams(surface, charts, int(config.samples * config.seam_share), config.seam_reach, rng)
+    face = np.concatenate([uniform.face, near_face])
+    barycentric = np.concatenate([uniform.barycentric, near])
+    xyz = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, surface.triangles[face]).astype(np.float32))
+    label = right_answers(networks, charts, xyz, face, barycentric, config.tolerance)
+    optimizer = OneCycleAdam(networks.assign, config.assign_steps, config.rate)
     for step in range(config.assign_steps):
         pick = torch.randint(len(xyz), (config.assign_batch,), generator=generator)
         loss = nn.functional.cross_entropy(networks.scores(xyz[pick]), label[pick])
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
+        optimizer.step(loss)
         if step % 25 == 0:
             progress("fit charts", step, config.assign_steps, loss.item())
 

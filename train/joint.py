@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from .losses import arap_energy, cosine_gap, position_gap, weighted_mean
 from .networks import Cycle, MultiChartNetworks
+from .optimizer import OneCycleAdam
 from .sampling import Samples, tangent_frames
 from .start import cluster, plane_projection
 
@@ -29,14 +30,6 @@ def joint_loss(cycle: Cycle, xyz: Tensor, normal: Tensor, config: JointConfig) -
     total = total + config.cycle_weight * position_gap(cycle.xyz, xyz)
     total = total + config.normal_weight * cosine_gap(cycle.normal, normal)
     return weighted_mean(total, score)
-
-
-def one_cycle(
-    module: nn.Module, steps: int, peak: float
-) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
-    """AdamW with a one-cycle schedule over ``steps``."""
-    optimizer = torch.optim.AdamW(module.parameters(), lr=peak, weight_decay=0.0)
-    return optimizer, torch.optim.lr_scheduler.OneCycleLR(optimizer, peak, total_steps=steps, pct_start=0.15)
 
 
 class SampleBank:
@@ -60,7 +53,7 @@ def fit_start(
 
     Each point counts on its own patch only.
     """
-    optimizer, schedule = one_cycle(networks, steps, 5e-3)
+    optimizer = OneCycleAdam(networks, steps, 5e-3)
     for _ in range(steps):
         pick = bank.draw(batch)
         feature = nn.functional.silu(networks.embedding(bank.xyz[pick]))
@@ -70,10 +63,7 @@ def fit_start(
         gap = ((flat - uv[:, pick]) ** 2).sum(-1) + ((wrapped[..., :3] - bank.xyz[pick]) ** 2).sum(-1)
         gap = gap + 0.1 * ((wrapped[..., 3:] - bank.normal[pick]) ** 2).sum(-1)
         loss = weighted_mean(gap, own) + nn.functional.cross_entropy(networks.assign(feature), label[pick])
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
+        optimizer.step(loss)
 
 
 def train_jointly(
@@ -89,17 +79,19 @@ def train_jointly(
     label = cluster(samples.xyz, samples.normal, config.charts, config.start, rng)
     uv = plane_projection(samples.xyz, samples.normal, label, config.charts)
     fit_start(
-        networks, bank, torch.from_numpy(label), torch.from_numpy(uv.astype(np.float32)), config.start.fit_steps, 1024
+        networks,
+        bank,
+        torch.from_numpy(label),
+        torch.from_numpy(uv.astype(np.float32)),
+        config.start.fit_steps,
+        config.joint.batch,
     )
-    optimizer, schedule = one_cycle(networks, config.joint.steps, config.joint.peak_rate)
+    optimizer = OneCycleAdam(networks, config.joint.steps, config.joint.peak_rate)
     for step in range(config.joint.steps):
         pick = bank.draw(config.joint.batch)
         cycle = networks(bank.xyz[pick], bank.tangents[:, pick])
         loss = joint_loss(cycle, bank.xyz[pick], bank.normal[pick], config.joint)
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
+        optimizer.step(loss)
         if step % 20 == 0 or step == config.joint.steps - 1:
             report(step, loss.item())
     return networks

@@ -30,7 +30,7 @@ class Piece:
     """A set of faces and its valid flattening.
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
-    slits: length of the cuts inside the piece, in √A.  relief: the relief slits, in their order.
+    slits: length of the cuts inside the piece, in √A.  relief: the relief slits, in their order.  resort: "xatlas" where all else failed.
     """
 
     ids: NDArray[np.int64]
@@ -38,11 +38,12 @@ class Piece:
     energy: float
     slits: float
     relief: tuple[Slit, ...] = ()
+    resort: str = ""
 
     @property
     def method(self) -> str:
-        """How the piece became valid: "slim", or "slit" where cuts inside it helped."""
-        return "slit" if self.slits > 0.0 else "slim"
+        """How the piece became valid: "slim", "slit" where cuts inside it helped, or its last resort."""
+        return self.resort or ("slit" if self.slits > 0.0 else "slim")
 
     def cost(self, price: float) -> float:
         """What the piece adds to the objective, its border left out."""
@@ -89,7 +90,7 @@ def flattened(piece: Surface, config: ContactConfig, goal: float) -> NDArray[np.
         return None
     for attempt in (lambda: free, lambda: slim(filled, start, 3), lambda: slim(filled, start, 1)):
         uv = attempt()[: len(piece.vertices)]
-        if not rim_overlaps(piece.faces, edges, uv):
+        if np.isfinite(uv).all() and not rim_overlaps(piece.faces, edges, uv):
             return uv
     return None
 

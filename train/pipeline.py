@@ -20,6 +20,8 @@ from .patches import split_into_patches
 from .sampling import sample_surface
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from .config import PatchConfig, TrainConfig
@@ -58,7 +60,7 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
     samples = sample_surface(ball, config.start.samples, np.random.default_rng(config.seed))
     steps = config.joint.steps
     scorer = train_jointly(samples, config, config.seed, lambda step, loss: progress("train", step, steps, loss))
-    finished = finish(ball, log_probability(scorer), config.charts, config.finish, lambda name: progress(name, 0, 1))
+    finished = finish(ball, log_probability(scorer), config.charts, config.finish, in_turn(progress))
     charts = as_charts(ball, finished, config.patch)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
@@ -70,6 +72,19 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, networks, frame, report)
+
+
+def in_turn(progress: Progress) -> Callable[[str], None]:
+    """Stages of one step: naming one ends the one before."""
+    running: list[str] = []
+
+    def begin(name: str) -> None:
+        while running:
+            progress(running.pop(), 1, 1)
+        running.append(name)
+        progress(name, 0, 1)
+
+    return begin
 
 
 def log_probability(networks: MultiChartNetworks) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from .fallback import unwrapped_by_xatlas
 from .flatten import jacobians, symmetric_dirichlet
 from .labels import DualGraph, border_lengths
 from .pieces import Piece, make_piece, relieved
@@ -52,14 +53,17 @@ class Regrouping:
         self._next += 1
         return self._next - 1
 
-    def add_valid(self, ids: NDArray[np.int64], slits: tuple[Slit, ...] = ()) -> None:
-        """Faces as one valid piece, with the slits given, or halved until they are valid."""
+    def add_valid(self, ids: NDArray[np.int64], slits: tuple[Slit, ...] = (), halvings: int = 0) -> None:
+        """Faces as one valid piece, with the slits given, or halved until they are valid; at last by xatlas."""
         piece = self.weigh(ids, slits) or (self.weigh(ids) if slits else None)
         if piece is not None:
             self.add(piece)
-            return
-        for half in halves(ids, self.graph, self.centroids, self.farthest(ids)):
-            self.add_valid(half)
+        elif halvings == self.config.halvings or len(ids) == 1:
+            for part in unwrapped_by_xatlas(self.surface, ids, self.area):
+                self.add(part)
+        else:
+            for half in halves(ids, self.graph, self.centroids, self.farthest(ids)):
+                self.add_valid(half, halvings=halvings + 1)
 
     def weigh(self, ids: NDArray[np.int64], slits: tuple[Slit, ...] = (), goal: float = np.inf) -> Piece | None:
         """A flattening of the faces, with no slits but those given; None also where it would cost more than goal."""
@@ -168,6 +172,8 @@ class Regrouping:
                 break
             self.apply_merge(found[1], found[2])
         for _ in range(self.config.rounds):
+            if len(self.stubborn) >= self.config.stubborn:
+                break
             worst = max(
                 (key for key in self.pieces if key not in self.stubborn),
                 key=lambda key: self.pieces[key].cost(self.config.relief.price),
