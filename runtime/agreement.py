@@ -58,8 +58,8 @@ class Agreement:
 def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: int = 0) -> Agreement:
     """Compare a map with an atlas at random surface points.
 
-    A point given to the wrong side of a seam is counted by the two shares alone: its distance says where the other side was
-    packed, or how far a slit gapes.
+    A point given to the wrong side of a seam is counted by the two shares alone: its distance says where the other
+    side was packed, or how far a slit gapes.
     """
     points, uv, chart = surface_points(atlas, count, np.random.default_rng(seed))
     answer = point_map.unwrap(points)
@@ -81,7 +81,7 @@ def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: i
 def across_a_seam(
     atlas: Atlas, points: NDArray[np.float64], answer: NDArray[np.float64], error: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """(n,) bool: the answer uv (n, 2) fits a seam point near the point (n, 3) at least twice as well as the point itself.
+    """(n,) bool: the answer uv (n, 2) fits a seam point near the point (n, 3) twice as well as that point.
 
     Near: within SEAM_REACH texels in space.  error (n,): distance of the answer from the point's own uv, texels.
     """

@@ -7,7 +7,7 @@
     │   ├── ShapeError                     an array has the wrong shape or dtype
     │   ├── BundleError                    an ONNX file that is not ours, or of another format version
     │   └── ForeignFileError               the output would overwrite a file that flexpara did not write
-    ├── MissingDependencyError    exit 3   torch, OpenGL, … is absent; the message says how to install it (also an ImportError)
+    ├── MissingDependencyError    exit 3   torch, OpenGL, … is absent; the message has the remedy (an ImportError)
     ├── FinishError               exit 1   no valid atlas could be made (a defect worth reporting)
     └── ParityError               exit 1   torch and onnxruntime disagree; nothing was written
 

@@ -1,8 +1,8 @@
 """The data every folder shares: Asset → Surface → Charts → Atlas.
 
-v welded vertices · n file vertices · f faces · k charts · p patches.  Positions are float64 in the units of the source file.
+v welded vertices · n file vertices · f faces · k charts · p patches.  Positions: float64, units of the source file.
 uv is v up; corner_uv (f, 3, 2) gives the uv of each corner of each face, which needs no decision on what is one vertex.
-Face i is the same triangle in all four.  All arrays are read-only by convention: nothing here is mutated after it is made.
+Face i is the same triangle in all four.  Arrays are read-only by convention: nothing is mutated after it is made.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Material:
 class Asset:
     """A mesh file, cleaned: the file's own vertices (split as the file splits them) and the welded surface beneath.
 
-    positions: (n, 3) float64.  faces: (f, 3) int64 into positions, the file's faces in the file's order, minus those dropped.
+    positions: (n, 3) float64.  faces: (f, 3) int64 into positions, the file's faces in its order, minus those dropped.
     weld: (n,) int64, the surface vertex of each file vertex.  surface: faces of it = weld[faces].
     normals: (n, 3) unit float64 or None.  colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
     face_material: (f,) int64 into materials.  changes: what cleaning did, name → count, only non-zero entries.
@@ -110,7 +110,7 @@ class Charts:
     """Finished charts, not packed: each flat in its own coordinates, in source units (uv area ≈ surface area).
 
     face_chart: (f,) int64 in [0, k).  corner_uv: (f, 3, 2) float64; inside a chart two faces are joined along an edge
-    exactly when their corner uv are equal there.  face_patch: (f,) int64 in [0, p): the Unwrap-Net that answers for the face.
+    exactly when their corner uv are equal there.  face_patch: (f,) int64 in [0, p): the Unwrap-Net that answers for it.
     patch_chart: (p,) int64.  method: per chart "slim", "slit" or "xatlas": how it became valid.
     """
 

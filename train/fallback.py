@@ -1,4 +1,4 @@
-"""The last resort: faces that our own flattening can't make valid are unwrapped by xatlas, and the report names them."""
+"""The last resort: faces that our own flattening can't make valid are unwrapped by xatlas, and named."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def unwrapped_by_xatlas(surface: Surface, ids: NDArray[np.int64], total_area: float) -> list[Piece]:
-    """The faces as xatlas's charts, each a piece of method "xatlas"; what even xatlas overlaps becomes single triangles."""
+    """The faces as xatlas's charts, each a piece of method "xatlas"; what even xatlas overlaps, as triangles."""
     points = surface.vertices[surface.faces[ids]].reshape(-1, 3).astype(np.float32)
     corners = np.unique(points, axis=0, return_inverse=True)
     faces = corners[1].reshape(-1, 3).astype(np.uint32)

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from ..runtime.topology import edge_table
-from .optimizer import OneCycleAdam
 from .networks import AtlasNetworks
+from .optimizer import OneCycleAdam
 from .sampling import sample_surface
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def right_answers(
     barycentric: NDArray[np.float64],
     tolerance: float,
 ) -> Tensor:
-    """(n, p) share of the right answer for each patch: ∝ exp(−(uv error / tolerance)²) over the patches of the face's chart.
+    """(n, p) share of the right answer for each patch: ∝ exp(−(uv error / tolerance)²) inside the face's chart.
 
     ``tolerance`` is a share of the charts' extent, √(total uv area).
     """
@@ -161,8 +161,8 @@ def fit_assign(
 ) -> None:
     """Cross-entropy on the patch, most samples close to the seams.
 
-    Where several patches of the right chart give the right uv, each is a right answer: the borders inside a chart that are no
-    cuts may lie anywhere, and all of the network's precision goes to the seams.
+    Where several patches of the right chart give the right uv, each is a right answer: the borders inside a chart that
+    are no cuts may lie anywhere, and all of the network's precision goes to the seams.
     """
     rng, generator = generators
     uniform = sample_surface(surface, int(config.samples * (1.0 - config.seam_share)), rng)

@@ -1,4 +1,4 @@
-"""Adam with a one-cycle learning rate, on lists of tensors.
+"""Adam with a one-cycle learning rate.
 
 torch.optim would do, but its first use imports torch's compiler, which takes longer (1 s) than fitting the Unwrap-Nets.
 """
@@ -18,7 +18,7 @@ EPSILON = 1e-8
 
 
 def one_cycle_rate(step: int, steps: int, peak: float, *, rise: float = 0.15) -> float:
-    """Learning rate of a step: from peak / 25 up to peak over the first ``rise`` of the steps, then to peak / 10⁴ ∙ 4.
+    """Learning rate of a step: from peak / 25 to peak over the first ``rise`` of the steps, then to peak / 2500.
 
     Cosine both ways (Smith & Topin 2018).
     """
@@ -31,12 +31,12 @@ def one_cycle_rate(step: int, steps: int, peak: float, *, rise: float = 0.15) ->
 
 
 class OneCycleAdam:
-    """Adam (Kingma & Ba 2015) over ``steps`` steps; call ``step(loss)`` once for each."""
+    """Adam (Kingma & Ba 2015) over ``steps`` steps, all parameters as one vector; call ``step(loss)`` once for each."""
 
     def __init__(self, module: nn.Module, steps: int, peak: float) -> None:
         self._parameters = list(module.parameters())
-        self._mean = [torch.zeros_like(p) for p in self._parameters]
-        self._square = [torch.zeros_like(p) for p in self._parameters]
+        self._sizes = [parameter.numel() for parameter in self._parameters]
+        self._mean, self._square = torch.zeros(sum(self._sizes)), torch.zeros(sum(self._sizes))
         self._count, self._steps, self._peak = 0, steps, peak
 
     def step(self, loss: Tensor) -> None:
@@ -46,10 +46,9 @@ class OneCycleAdam:
         self._count += 1
         first, second = (1.0 - beta**self._count for beta in BETAS)
         with torch.no_grad():
-            torch._foreach_lerp_(self._mean, gradients, 1.0 - BETAS[0])
-            torch._foreach_mul_(self._square, BETAS[1])
-            torch._foreach_addcmul_(self._square, gradients, gradients, 1.0 - BETAS[1])
-            scale = torch._foreach_sqrt(self._square)
-            torch._foreach_div_(scale, math.sqrt(second))
-            torch._foreach_add_(scale, EPSILON)
-            torch._foreach_addcdiv_(self._parameters, self._mean, scale, -rate / first)
+            gradient = torch.cat([part.reshape(-1) for part in gradients])
+            self._mean.lerp_(gradient, 1.0 - BETAS[0])
+            self._square.mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
+            change = self._mean / (self._square.sqrt() / math.sqrt(second) + EPSILON) * (-rate / first)
+            for parameter, part in zip(self._parameters, change.split(self._sizes), strict=True):
+                parameter.add_(part.view_as(parameter))

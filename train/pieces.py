@@ -30,7 +30,8 @@ class Piece:
     """A set of faces and its valid flattening.
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
-    slits: length of the cuts inside the piece, in √A.  relief: the relief slits, in their order.  resort: "xatlas" where all else failed.
+    slits: length of the cuts inside the piece, in √A.  relief: those made for relief, in order.
+    resort: "xatlas" where all else failed.
     """
 
     ids: NDArray[np.int64]
