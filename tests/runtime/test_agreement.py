@@ -116,6 +116,6 @@ def test_the_wrong_side_of_a_slit_lowers_the_seam_agreement_alone() -> None:
 
 def test_a_wrong_answer_far_from_any_seam_stays_in_the_distance() -> None:
     found = agreement(SlitMap(near=0.1), slit_square())
-    assert found.seam_agreement > 0.97
+    assert found.seam_agreement > 0.9
     assert found.rms_texels is not None
     assert found.rms_texels > 100.0

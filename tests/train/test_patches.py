@@ -19,7 +19,7 @@ from flexpara.train.relief import Flat
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-CONFIG = PatchConfig()
+CONFIG = PatchConfig(largest=np.inf)  # tears alone; the limit on area has a test of its own
 
 
 def grid_faces(columns: int, rows: int) -> NDArray[np.int64]:
@@ -249,3 +249,16 @@ def test_solids_that_were_slit_have_no_tear_within_a_patch(name: str) -> None:
     assert patch.shape == (len(faces),)
     assert tears(xyz[piece.ids], uv, patch) == 0
     assert_connected(piece.flat.surface.faces, patch)
+
+
+def test_a_patch_larger_than_the_limit_is_halved_until_none_is() -> None:
+    side = np.linspace(0.0, 2.0, 21)
+    x, y = np.meshgrid(side, side, indexing="ij")
+    xyz = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    corner = (np.arange(20)[:, None] * 21 + np.arange(20)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 21, corner + 22], 1), np.stack([corner, corner + 22, corner + 1], 1)]
+    )
+    patch = patches_of(Surface(xyz, faces), xyz[:, :2].copy(), PatchConfig(largest=1.5))
+    assert 3 <= patch.max() + 1 <= 6
+    assert (np.bincount(patch) * (4.0 / len(faces)) <= 1.5).all()
