@@ -308,8 +308,9 @@ def test_slits_repeat_on_a_finer_mesh_of_the_same_shape() -> None:
     assert np.array_equal(again.triangles, fine.triangles)
     assert euler_characteristic(again.faces) == 1
     assert len(boundary_loops(again.faces)) == 1
-    added = border_length(again) - border_length(fine)
-    assert added == pytest.approx(border_length(open_.surface) - border_length(coarse.surface), rel=0.2)
+    assert border_length(again) - border_length(fine) == pytest.approx(
+        border_length(open_.surface) - border_length(coarse.surface), rel=0.2
+    )
     assert excess(flattened(again)) < 0.1 * excess(flattened(fine))
 
 
