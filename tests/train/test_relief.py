@@ -1,7 +1,4 @@
-"""Relief cuts: cones in closed form, flat sheets, caps, socks and waves.
-
-A *sock* is a tube closed by half a sphere: no disk carries it without stretch until it is slit.
-"""
+"""Relief cuts: cones in closed form, flat sheets, caps, waves and socks (a tube closed by half a sphere)."""
 
 from __future__ import annotations
 
