@@ -6,11 +6,11 @@ n file vertices · f faces.  Positions are float64 in source units, uv is v up, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import MeshError
+from .errors import MeshError, ShapeError
 from .mesh import Material
 
 if TYPE_CHECKING:
@@ -168,3 +168,20 @@ def _joined_materials(
     if any(part.face_material is None for part in parts):
         materials.append(Material(name="default"))
     return tuple(materials), np.concatenate(columns)
+
+
+def unit_vectors(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows of unit length (a zero row stays zero, not-finite numbers become zero)."""
+    finite = np.nan_to_num(vectors, posinf=0.0, neginf=0.0)
+    return finite / np.maximum(np.linalg.norm(finite, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+
+
+def as_rgba(colors: NDArray[Any]) -> NDArray[np.uint8]:
+    """(n, 3 or 4) uint8, or float in [0, 1] → (n, 4) uint8; a missing alpha is opaque."""
+    if colors.dtype.kind == "f":
+        colors = np.rint(np.clip(np.nan_to_num(colors), 0.0, 1.0) * 255.0)
+    elif colors.dtype != np.uint8:
+        raise ShapeError(f"colors have dtype {colors.dtype}, expected uint8, or float in [0, 1]; convert them")
+    opaque = np.full((len(colors), 4), 255, dtype=np.uint8)
+    opaque[:, : colors.shape[1]] = colors
+    return opaque

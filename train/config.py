@@ -34,7 +34,7 @@ class StartConfig:
     """Weight of the unit normal against the position in the clustering distance."""
     rounds: int = 12
     """Lloyd iterations."""
-    fit_steps: int = 100
+    fit_steps: int = 80
     """Steps of fitting the networks to cluster labels and plane projections."""
 
 
@@ -42,7 +42,7 @@ class StartConfig:
 class JointConfig:
     """Joint training: the paper's score-weighted losses."""
 
-    steps: int = 100
+    steps: int = 60
     """Optimizer steps."""
     batch: int = 512
     """Surface samples a step."""
@@ -132,7 +132,7 @@ class FinishConfig:
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
-    stubborn: int = 3
+    stubborn: int = 2
     """Charts that no split improves, before the search ends."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
