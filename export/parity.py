@@ -29,7 +29,7 @@ class ParitySpec:
 
     sizes: tuple[int, ...] = (1, 2, 1000)
     """Numbers of points n; 1 finds a frozen axis, 2 a squeezed one."""
-    uv_atol: float = 2e-5
+    uv_atol: float = 1e-4
     """Largest |Δuv|: 0.04 texels at 2048², a tenth of what the networks themselves miss the atlas by at most."""
     score_atol: float = 1e-4
     """Largest |Δscore|."""

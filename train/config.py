@@ -42,7 +42,7 @@ class StartConfig:
 class JointConfig:
     """Joint training: the paper's score-weighted losses."""
 
-    steps: int = 60
+    steps: int = 100
     """Optimizer steps."""
     batch: int = 512
     """Surface samples a step."""

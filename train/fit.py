@@ -78,7 +78,7 @@ def solve_last_layer(networks: AtlasNetworks, samples: PatchSamples) -> None:
     design = torch.cat([hidden, torch.ones_like(hidden[..., :1])], dim=-1)
     gram = design.mT @ design
     ridge = (
-        1e-9 * gram.diagonal(dim1=-2, dim2=-1).mean(dim=-1)[:, None, None] * torch.eye(gram.shape[-1], dtype=gram.dtype)
+        1e-7 * gram.diagonal(dim1=-2, dim2=-1).mean(dim=-1)[:, None, None] * torch.eye(gram.shape[-1], dtype=gram.dtype)
     )
     target = (samples.uv * samples.scale + samples.centre).double()
     solution = torch.linalg.solve(gram + ridge, design.mT @ target)
