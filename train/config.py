@@ -42,7 +42,7 @@ class StartConfig:
 class JointConfig:
     """Joint training: the paper's score-weighted losses."""
 
-    steps: int = 100
+    steps: int = 80
     """Optimizer steps."""
     batch: int = 512
     """Surface samples a step."""
@@ -80,7 +80,7 @@ class ContactConfig:
     """SLIM iterations between two looks at the energy."""
     blocks: int = 10
     """Blocks at most."""
-    still: float = 0.04
+    still: float = 0.06
     """A block that lowers the energy by less than this share ends the run."""
     patience: float = 3.0
     """How many more drops like the last one a block is trusted with."""
@@ -128,7 +128,7 @@ class FinishConfig:
 
     labels: LabelConfig = field(default_factory=LabelConfig)
     relief: ReliefConfig = field(default_factory=ReliefConfig)
-    surrogate_faces: int = 2500
+    surrogate_faces: int = 2000
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
@@ -136,7 +136,7 @@ class FinishConfig:
     """Charts that no split improves, before the search ends."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
-    necks: int = 2
+    necks: int = 1
     """Borders tried for each split and seed."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
@@ -176,7 +176,7 @@ class FitConfig:
     """Optimizer steps of the Unwrap-Nets."""
     unwrap_batch: int = 128
     """Samples a step and patch."""
-    assign_steps: int = 600
+    assign_steps: int = 500
     """Optimizer steps of the Assign-Net."""
     assign_batch: int = 1024
     """Samples a step."""
@@ -184,6 +184,8 @@ class FitConfig:
     """Share of the Assign-Net's samples that lie close to seams."""
     seam_reach: float = 0.008
     """Standard deviation of their distance from the seam."""
+    thin_reach: float = 0.06
+    """Distance within which the surface counts as close to itself."""
     tolerance: float = 0.002
     """uv error, as a share of √(total uv area), up to which another patch of the chart is a right answer too."""
     rate: float = 1e-2

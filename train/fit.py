@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import torch
+from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from ..runtime.topology import edge_table
@@ -113,6 +114,33 @@ def sample_seams(
     return face[pick], barycentric
 
 
+def sample_thin(
+    surface: Surface, charts: Charts, count: int, reach: float, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Points where the surface comes close to itself with another answer: both sides of an ear, a fin, a sheet.
+
+    Out of ``count`` samples, those with one of another patch within ``reach`` whose uv are elsewhere: their faces (n,)
+    and barycentrics (n, 3).
+    """
+    pool = sample_surface(surface, count, rng)
+    scale = np.sqrt(uv_area(charts) / surface.face_areas().sum())
+    uv = np.einsum("nc,ncd->nd", pool.barycentric, charts.corner_uv[pool.face]) / scale
+    distance, index = KDTree(pool.xyz).query(pool.xyz, k=16, distance_upper_bound=reach)
+    near = np.isfinite(distance)
+    other = np.where(near, index, 0)
+    patch, chart = charts.face_patch[pool.face], charts.face_chart[pool.face]
+    gap = np.linalg.norm(uv[:, None] - uv[other], axis=2)
+    elsewhere = (chart[:, None] != chart[other]) | (gap > 3.0 * distance)
+    thin = (near & (patch[:, None] != patch[other]) & elsewhere).any(axis=1)
+    return pool.face[thin], pool.barycentric[thin]
+
+
+def uv_area(charts: Charts) -> float:
+    """Total area of all uv triangles."""
+    first, second = charts.corner_uv[:, 1] - charts.corner_uv[:, 0], charts.corner_uv[:, 2] - charts.corner_uv[:, 0]
+    return float(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
+
+
 def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:
     """Half-edges 3·face + corner along borders between two charts, and along slits that divide two patches."""
     table = edge_table(surface.faces)
@@ -139,8 +167,7 @@ def right_answers(
     ``tolerance`` is a share of the charts' extent, √(total uv area).
     """
     corner = charts.corner_uv
-    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    extent = np.sqrt(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
+    extent = np.sqrt(uv_area(charts))
     truth = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, corner[face]).astype(np.float32))
     chart = torch.from_numpy(charts.patch_chart)
     same = chart[None] == torch.from_numpy(charts.face_chart[face])[:, None]
@@ -159,7 +186,7 @@ def fit_assign(
     generators: tuple[np.random.Generator, torch.Generator],
     progress: Progress,
 ) -> None:
-    """Cross-entropy on the patch, most samples close to the seams.
+    """Cross-entropy on the patch, most samples close to seams and where the surface comes close to itself.
 
     Where several patches of the right chart give the right uv, each is a right answer: the borders inside a chart that
     are no cuts may lie anywhere, and all of the network's precision goes to the seams.
@@ -167,8 +194,9 @@ def fit_assign(
     rng, generator = generators
     uniform = sample_surface(surface, int(config.samples * (1.0 - config.seam_share)), rng)
     near_face, near = sample_seams(surface, charts, int(config.samples * config.seam_share), config.seam_reach, rng)
-    face = np.concatenate([uniform.face, near_face])
-    barycentric = np.concatenate([uniform.barycentric, near])
+    thin_face, thin = sample_thin(surface, charts, config.samples, config.thin_reach, rng)
+    face = np.concatenate([uniform.face, near_face, thin_face])
+    barycentric = np.concatenate([uniform.barycentric, near, thin])
     xyz = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, surface.triangles[face]).astype(np.float32))
     label = right_answers(networks, charts, xyz, face, barycentric, config.tolerance)
     optimizer = OneCycleAdam(networks.assign, config.assign_steps, config.rate)
