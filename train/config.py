@@ -34,7 +34,7 @@ class StartConfig:
     """Weight of the unit normal against the position in the clustering distance."""
     rounds: int = 12
     """Lloyd iterations."""
-    fit_steps: int = 80
+    fit_steps: int = 100
     """Steps of fitting the networks to cluster labels and plane projections."""
 
 
@@ -42,7 +42,7 @@ class StartConfig:
 class JointConfig:
     """Joint training: the paper's score-weighted losses."""
 
-    steps: int = 80
+    steps: int = 100
     """Optimizer steps."""
     batch: int = 512
     """Surface samples a step."""
@@ -80,7 +80,7 @@ class ContactConfig:
     """SLIM iterations between two looks at the energy."""
     blocks: int = 10
     """Blocks at most."""
-    still: float = 0.06
+    still: float = 0.04
     """A block that lowers the energy by less than this share ends the run."""
     patience: float = 3.0
     """How many more drops like the last one a block is trusted with."""
@@ -128,15 +128,15 @@ class FinishConfig:
 
     labels: LabelConfig = field(default_factory=LabelConfig)
     relief: ReliefConfig = field(default_factory=ReliefConfig)
-    surrogate_faces: int = 2000
+    surrogate_faces: int = 2500
     """Faces of the simplified surface on which charts are split and merged."""
     rounds: int = 8
     """Times the worst chart may be split."""
-    stubborn: int = 2
+    stubborn: int = 3
     """Charts that no split improves, before the search ends."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
-    necks: int = 1
+    necks: int = 2
     """Borders tried for each split and seed."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..runtime.errors import FinishError
 from ..runtime.overlap import flipped_triangles, overlapping_pairs
-from ..runtime.topology import edge_table
+from ..runtime.topology import components, edge_table, split_non_manifold_vertices
 from .labels import connected_pieces, dual_graph, merge_pieces, smooth_labels
 from .pieces import Piece
 from .regroup import Regrouping
@@ -54,6 +54,7 @@ def finish(
     Raises:
         FinishError: the result failed the exact check (a defect).
     """
+    charts = max(charts - pinched(surface), 1)
     stage("split and merge")
     coarse = simplified(surface, config.surrogate_faces)
     search = regrouped(coarse, log_probability, charts, config)
@@ -99,6 +100,12 @@ def carried_back(surface: Surface, coarse: Surface, found: Regrouping, charts: i
         search.add_valid(ids, source.relief)
     search.search(limit)
     return search
+
+
+def pinched(surface: Surface) -> int:
+    """Parts that only non-manifold edges join to the rest: pieces of their own that don't raise the limit on charts."""
+    apart = components(split_non_manifold_vertices(surface.faces)[0])
+    return int(apart.max() - components(surface.faces).max())
 
 
 def component_count(graph: DualGraph, faces: int) -> int:
