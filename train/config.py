@@ -142,7 +142,7 @@ class FinishConfig:
     """Share of the smaller border that two pieces must share to be worth a merge."""
     bump: float = 0.03
     """Share of the surface under which a piece is a bump: a merge with it is weighed with slits."""
-    dear: float = 0.01
+    dear: float = 0.02
     """Excess energy over which a finished piece is slit once more, with contacts."""
 
 
@@ -176,7 +176,7 @@ class FitConfig:
     """Optimizer steps of the Unwrap-Nets."""
     unwrap_batch: int = 128
     """Samples a step and patch."""
-    assign_steps: int = 500
+    assign_steps: int = 700
     """Optimizer steps of the Assign-Net."""
     assign_batch: int = 1024
     """Samples a step."""
