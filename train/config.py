@@ -172,7 +172,7 @@ class FitConfig:
 
     samples: int = 60000
     """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
-    unwrap_steps: int = 150
+    unwrap_steps: int = 300
     """Optimizer steps of the Unwrap-Nets."""
     unwrap_batch: int = 128
     """Samples a step and patch."""
