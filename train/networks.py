@@ -50,7 +50,7 @@ class Perceptron(nn.Module):
     """Dense layers with SiLU between them, none after the last.
 
     The paper takes LeakyReLU(0.01), whose derivative is piecewise constant: the distortion of a map then says nothing
-    about where its kinks should go.  SiLU gives the same shapes a useful gradient, which small networks need.
+    about where its kinks should go.  SiLU gives the same shapes a useful gradient, which was not compared with the paper's.
     """
 
     def __init__(self, channels: tuple[int, ...], *, copies: int | None = None, generator: torch.Generator) -> None:
