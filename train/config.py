@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class NetConfig:
-    """Sizes of the networks.  The paper uses width 512 throughout; 64 is a choice for the CPU, not compared with wider."""
+    """Sizes of the networks.  The paper uses width 512 throughout; 64 is a choice for CPUs, not compared."""
 
     width: int = 64
     """Channels of the hidden layers of embedding, Unwrap- and Wrap-Nets."""

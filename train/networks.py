@@ -49,8 +49,8 @@ class Dense(nn.Module):
 class Perceptron(nn.Module):
     """Dense layers with SiLU between them, none after the last.
 
-    The paper takes LeakyReLU(0.01), whose derivative is piecewise constant: the distortion of a map then says nothing
-    about where its kinks should go.  SiLU gives the same shapes a useful gradient, which was not compared with the paper's.
+    The paper takes LeakyReLU(0.01).  SiLU is smooth, so the gradient of a distortion also says where the map should
+    bend; the two were not compared.
     """
 
     def __init__(self, channels: tuple[int, ...], *, copies: int | None = None, generator: torch.Generator) -> None:
