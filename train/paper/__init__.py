@@ -1,0 +1,1 @@
+"""FlexPara as the paper describes it (Zhao et al. 2025, arXiv 2504.19210): preset ``paper``."""
