@@ -17,6 +17,7 @@ from .fallback import unwrapped_by_xatlas
 from .flatten import jacobians, symmetric_dirichlet
 from .labels import DualGraph, border_lengths
 from .pieces import Piece, make_piece, relieved
+from .workers import parallel_map
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,9 +72,9 @@ class Regrouping:
 
     def relieve_all(self, above: float, *, contacts: bool = False) -> None:
         """Slits where they pay, in all pieces of more excess energy than ``above``."""
-        for key, piece in self.pieces.items():
-            if piece.energy > above:
-                self.pieces[key] = self.relieve(piece, contacts=contacts)
+        keys = [key for key, piece in self.pieces.items() if piece.energy > above]
+        found = parallel_map(lambda key: self.relieve(self.pieces[key], contacts=contacts), keys)
+        self.pieces.update(zip(keys, found, strict=True))
 
     def relieve(self, piece: Piece, *, contacts: bool = False) -> Piece:
         """Slit where it pays.  ``contacts``: hold slits apart that would overlap (slow), else leave such slits out."""
@@ -116,21 +117,27 @@ class Regrouping:
         price = self.config.relief.price
         borders = self.borders()
         around = {key: sum(length for pair, length in borders.items() if key in pair) for key in self.pieces}
+        apart = {
+            pair: sum(self.pieces[key].cost(price) for key in pair) + price * length
+            for pair, length in borders.items()
+            if not excluded & set(pair) and length >= self.config.shared * min(around[key] for key in pair)
+        }
+        self.weigh_merges({pair: cost - least for pair, cost in apart.items()})
         best = None
-        for pair, length in borders.items():
-            apart = sum(self.pieces[key].cost(price) for key in pair) + price * length
-            if excluded & set(pair) or length < self.config.shared * min(around[key] for key in pair):
-                continue
-            merged = self.merged(pair, apart - least)
-            if merged is not None and (best is None or apart - merged.cost(price) > best[0]):
-                best = apart - merged.cost(price), pair, merged
+        for pair, cost in apart.items():
+            merged = self.merges[pair].piece
+            if merged is not None and (best is None or cost - merged.cost(price) > best[0]):
+                best = cost - merged.cost(price), pair, merged
         return best if best is not None and best[0] > least else None
 
-    def merged(self, pair: tuple[int, int], goal: float) -> Piece | None:
-        """The pair as one piece, weighed once; None where it can't be flattened for less than goal."""
-        known = self.merges.get(pair)
-        if known is not None and (known.piece is not None or goal <= known.goal):
-            return known.piece
+    def weigh_merges(self, goals: dict[tuple[int, int], float]) -> None:
+        """Fill ``merges`` for the pairs, each with the goal under which it is of interest; each pair once."""
+        known = self.merges
+        new = [p for p in goals if p not in known or (known[p].piece is None and goals[p] > known[p].goal)]
+        known.update(zip(new, parallel_map(lambda pair: self.merged(pair, goals[pair]), new), strict=True))
+
+    def merged(self, pair: tuple[int, int], goal: float) -> Weighed:
+        """The pair as one piece; no piece where it can't be flattened for less than goal."""
         ids = np.concatenate([self.pieces[key].ids for key in pair])
         smaller = min(self.areas[self.pieces[key].ids].sum() for key in pair) / self.area
         if smaller < self.config.bump:  # a bump on a big piece flattens only once it is slit, and such slits are cheap
@@ -138,8 +145,7 @@ class Regrouping:
         piece = self.weigh(ids, goal=goal)
         if piece is not None and smaller < self.config.bump:
             piece = self.relieve(piece)
-        self.merges[pair] = Weighed(piece, goal)
-        return piece
+        return Weighed(piece, goal)
 
     def apply_merge(self, pair: tuple[int, int], piece: Piece) -> None:
         """Replace two pieces by one."""
@@ -151,17 +157,22 @@ class Regrouping:
         """The best way found to halve a piece: (gain, parts)."""
         piece, price = self.pieces[key], self.config.relief.price
         load = symmetric_dirichlet(jacobians(piece.flat.surface, piece.flat.uv)) * piece.flat.surface.face_areas()
+        ways = [
+            parts_ids
+            for seed in dict.fromkeys((int(piece.ids[load.argmax()]), self.farthest(piece.ids)))
+            for parts_ids in necks(piece.ids, self.graph, self.centroids, self.areas, seed, self.config.necks)
+        ]
+        plain = iter(parallel_map(self.weigh, [ids for parts_ids in ways for ids in parts_ids]))
+        flat = [(parts_ids, [next(plain) for _ in parts_ids]) for parts_ids in ways]
+        valid = [(ids, [part for part in parts if part is not None]) for ids, parts in flat if None not in parts]
+        relieved_parts = iter(parallel_map(self.relieve, [part for _, parts in valid for part in parts]))
         best = None
-        for seed in {int(piece.ids[load.argmax()]), self.farthest(piece.ids)}:
-            for parts_ids in necks(piece.ids, self.graph, self.centroids, self.areas, seed, self.config.necks):
-                parts = [self.weigh(ids) for ids in parts_ids]
-                if any(part is None for part in parts):
-                    continue
-                whole = [self.relieve(part) for part in parts if part is not None]
-                cut = neck_length(parts_ids[0], parts_ids[1:], self.graph, len(self.surface.faces)) / self.unit
-                gain = piece.cost(price) - sum(part.cost(price) for part in whole) - price * cut
-                if best is None or gain > best[0]:
-                    best = gain, whole
+        for parts_ids, parts in valid:
+            whole = [next(relieved_parts) for _ in parts]
+            cut = neck_length(parts_ids[0], parts_ids[1:], self.graph, len(self.surface.faces)) / self.unit
+            gain = piece.cost(price) - sum(part.cost(price) for part in whole) - price * cut
+            if best is None or gain > best[0]:
+                best = gain, whole
         return best
 
     def search(self, most: int) -> None:
