@@ -1,0 +1,79 @@
+"""Work shared between forked copies."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexpara.runtime.errors import FinishError
+from flexpara.train import workers
+from flexpara.train.workers import parallel_map
+
+
+@pytest.fixture(params=[1, 2, 3])
+def cores(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr(workers, "available_cores", lambda: request.param)
+    return request.param
+
+
+def test_results_come_in_the_order_of_the_items(cores: int) -> None:
+    assert parallel_map(lambda n: n * n, range(50)) == [n * n for n in range(50)]
+
+
+def test_no_items_give_no_results(cores: int) -> None:
+    assert parallel_map(abs, []) == []
+
+
+def test_large_results_pass_through(cores: int) -> None:
+    found = parallel_map(lambda n: np.full(300_000, n), [1, 2, 3])
+    assert [part.sum() for part in found] == [300_000, 600_000, 900_000]
+
+
+def test_what_the_function_raises_is_raised(cores: int) -> None:
+    with pytest.raises(FinishError, match="seven"):
+        parallel_map(seven_fails, range(20))
+
+
+def test_the_work_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "available_cores", lambda: 2)
+    assert len(set(parallel_map(slow_process_number, range(6)))) == 2
+
+
+def test_a_killed_copy_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "available_cores", lambda: 2)
+    parent = os.getpid()
+
+    def killed(_: int) -> None:
+        time.sleep(0.05)
+        if os.getpid() != parent:
+            os._exit(1)
+
+    with pytest.raises(FinishError, match="killed"):
+        parallel_map(killed, range(6))
+
+
+def test_no_process_is_left_behind(cores: int) -> None:
+    parallel_map(abs, range(8))
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_no_file_stays_open(cores: int) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    parallel_map(abs, range(8))
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def seven_fails(n: int) -> int:
+    if n == 7:
+        raise FinishError("seven found, expected another; choose one")
+    return n
+
+
+def slow_process_number(_: int) -> int:
+    time.sleep(0.05)
+    return os.getpid()

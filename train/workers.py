@@ -1,0 +1,124 @@
+"""Independent pieces of work shared between the cores: this process and forked copies of it.
+
+libigl holds Python's lock while SLIM runs, so threads don't help; a fork costs 10 ms and hands over all inputs for
+nothing, where a pool of fresh processes would import for a second.  Where there is no fork, the work is done in turn:
+the results are the same.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle  # only between this process and its own copies, never from a file
+import signal
+import struct
+import sys
+import warnings
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from ..runtime.errors import FinishError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+TICKET = struct.Struct("<H")
+MOST = 16384
+"""Tickets that a pipe surely holds at once (64 KiB on Linux, 16 bits each)."""
+
+
+class Copy(NamedTuple):
+    """A forked copy of this process: its number, and the end of the pipe that its results come from."""
+
+    process: int
+    results: int
+
+
+def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """``[function(item) for item in items]`` on all cores this process may use.
+
+    ``function`` must not use torch (its threads don't survive a fork); results must be picklable.
+
+    Raises: what the function raises; FinishError when a copy was killed.
+    """
+    helpers = min(available_cores(), len(items), MOST) - 1
+    if helpers < 1 or len(items) > MOST:
+        return [function(item) for item in items]
+    tickets = ticket_pipe(len(items))
+    copies: list[Copy] = []
+    try:
+        copies += [forked(function, items, tickets) for _ in range(helpers)]
+        done = worked_off(function, items, tickets)
+        for copy in copies:
+            done |= collected(copy)
+    finally:
+        os.close(tickets)
+        for copy in copies:
+            dismiss(copy)
+    return [done[number] for number in range(len(items))]
+
+
+def available_cores() -> int:
+    """Cores for this process; 1 where it can't be forked safely (other systems than Linux)."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+
+
+def ticket_pipe(count: int) -> int:
+    """The reading end of a pipe with one ticket for each item: whoever is free takes the next."""
+    reading, writing = os.pipe()
+    os.write(writing, b"".join(TICKET.pack(number) for number in range(count)))
+    os.close(writing)
+    return reading
+
+
+def worked_off(function: Callable[[Item], Result], items: Sequence[Item], tickets: int) -> dict[int, Result]:
+    """Results by item number, until no ticket is left."""
+    done: dict[int, Result] = {}
+    while ticket := os.read(tickets, TICKET.size):
+        (number,) = TICKET.unpack(ticket)
+        done[number] = function(items[number])
+    return done
+
+
+def forked(function: Callable[[Item], Result], items: Sequence[Item], tickets: int) -> Copy:
+    """A copy of this process that works tickets off, sends what it found, and ends."""
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():
+        # Python ≥ 3.12 warns of forks beside threads; the copy runs numpy and libigl only, and takes no lock
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process = os.fork()
+    if process:
+        os.close(writing)
+        return Copy(process, reading)
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+        os.close(reading)
+        answer: tuple[dict[int, Any], Exception | None] = {}, None
+        try:
+            answer = worked_off(function, items, tickets), None
+        except Exception as error:  # raised again in the parent
+            answer = {}, error
+        with os.fdopen(writing, "wb") as pipe:
+            pickle.dump(answer, pipe, protocol=pickle.HIGHEST_PROTOCOL)
+    finally:
+        os._exit(0)
+
+
+def collected(copy: Copy) -> dict[int, Any]:
+    """What a copy found.  Raises what its function raised, or FinishError when it ended without an answer."""
+    with os.fdopen(os.dup(copy.results), "rb") as pipe:
+        sent = pipe.read()
+    if not sent:
+        raise FinishError("a worker process was killed, expected results; free memory and run again")
+    done, error = pickle.loads(sent)
+    if error is not None:
+        raise error
+    return done
+
+
+def dismiss(copy: Copy) -> None:
+    """End a copy, if it hasn't ended, and wait for it."""
+    os.close(copy.results)
+    os.kill(copy.process, signal.SIGKILL)  # an ended child stays until it is waited for, so the number is still its own
+    os.waitpid(copy.process, 0)
