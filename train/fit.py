@@ -166,16 +166,17 @@ def right_answers(
 
     ``tolerance`` is a share of the charts' extent, √(total uv area).
     """
-    corner = charts.corner_uv
-    extent = np.sqrt(uv_area(charts))
-    truth = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, corner[face]).astype(np.float32))
-    chart = torch.from_numpy(charts.patch_chart)
-    same = chart[None] == torch.from_numpy(charts.face_chart[face])[:, None]
-    error = torch.cat(
-        [(networks(x)[1] - t[:, None]).norm(dim=-1) for x, t in zip(xyz.split(4096), truth.split(4096), strict=True)]
-    )
-    closeness = -((error / (tolerance * float(extent))) ** 2)
-    return torch.softmax(closeness.masked_fill(~same, -torch.inf), dim=-1)
+    reach = tolerance * float(np.sqrt(uv_area(charts)))
+    truth = torch.from_numpy(np.einsum("nc,ncd->nd", barycentric, charts.corner_uv[face]).astype(np.float32))
+    chart = torch.from_numpy(charts.face_chart[face])
+    answers = torch.zeros(len(xyz), len(charts.patch_chart))
+    for number in range(int(charts.patch_chart.max()) + 1):
+        patches = torch.from_numpy(np.flatnonzero(charts.patch_chart == number))
+        for rows in torch.nonzero(chart == number)[:, 0].split(4096):
+            uv = networks.unwrap.among(networks.unwrap_features(xyz[rows]), patches)
+            closeness = -(((uv - truth[rows]).norm(dim=-1) / reach) ** 2)
+            answers[rows[:, None], patches] = torch.softmax(closeness, dim=0).T
+    return answers
 
 
 def fit_assign(

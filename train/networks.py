@@ -40,6 +40,10 @@ class Dense(nn.Module):
         """Affine map of the last axis."""
         return x @ self.weight + self.bias
 
+    def among(self, x: Tensor, copies: Tensor) -> Tensor:
+        """The same, by the layers ``copies`` (q,) int64 alone: (…, n, c_in) → (q, n, c_out)."""
+        return x @ self.weight[copies] + self.bias[copies]
+
     def jet(self, x: Tensor) -> Tensor:
         """Value and tangents, (3, …, n, c): only the value gets the bias."""
         value, tangents = torch.split(x @ self.weight, [1, 2])
@@ -66,6 +70,13 @@ class Perceptron(nn.Module):
         for layer in self.layers[:-1]:
             x = nn.functional.silu(layer(x))
         return self.layers[-1](x)
+
+    def among(self, x: Tensor, copies: Tensor) -> Tensor:
+        """The same, by the copies (q,) int64 alone: (n, channels[0]) → (q, n, channels[-1])."""
+        *inner, last = (layer for layer in self.layers if isinstance(layer, Dense))
+        for layer in inner:
+            x = nn.functional.silu(layer.among(x, copies))
+        return last.among(x, copies)
 
     def jet(self, x: Tensor) -> Tensor:
         """The same on jets (3, …, n, c)."""
