@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import MeshError
-from .gltfbuffers import GltfFile, buffer_view, parse_tree, read_accessor, read_buffers, read_resource
-from .materials import decode_image, linear_to_srgb
-from .mesh import Material
+from .gltfbuffers import GltfFile, parse_tree, read_accessor, read_buffers
+from .gltfmaterials import read_materials, uv_set
+from .materials import linear_to_srgb
 from .rawmesh import MAX_FACES, RawMesh, merge, transformed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from .mesh import Material
+
 TRIANGLES, STRIP, FAN = 4, 5, 6
-TRANSFORM = "KHR_texture_transform"
 
 
 def read_gltf(data: bytes, folder: Path) -> RawMesh:
@@ -99,7 +101,7 @@ def _placed_meshes(tree: dict[str, Any]) -> list[tuple[int, NDArray[np.float64]]
 
 
 def _scene(file: GltfFile) -> RawMesh:
-    materials, changes = _materials(file)
+    materials, changes = read_materials(file)
     parts, skipped, faces = [], 0, 0
     for mesh, world in _placed_meshes(file.tree):
         for primitive in file.tree["meshes"][mesh]["primitives"]:
@@ -118,14 +120,14 @@ def _scene(file: GltfFile) -> RawMesh:
     return whole
 
 
-def _primitive(file: GltfFile, primitive: dict[str, Any], materials: list[Material]) -> RawMesh:
+def _primitive(file: GltfFile, primitive: dict[str, Any], materials: Sequence[Material]) -> RawMesh:
     attributes = primitive["attributes"]
     positions = read_accessor(file, attributes["POSITION"]).astype(np.float64)
     indices = read_accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(positions))
     faces = _triangles(indices.astype(np.int64), primitive.get("mode", TRIANGLES))
     normals = read_accessor(file, attributes["NORMAL"]).astype(np.float64) if "NORMAL" in attributes else None
     index = primitive.get("material")
-    name = f"TEXCOORD_{_base_texture(file.tree, index).get('texCoord', 0)}"
+    name = f"TEXCOORD_{0 if index is None else uv_set(file.tree['materials'][index])}"
     uv = read_accessor(file, attributes[name]).astype(np.float64) if name in attributes else None
     colors = _srgb(read_accessor(file, attributes["COLOR_0"])) if "COLOR_0" in attributes else None
     if any(values is not None and len(values) != len(positions) for values in (normals, uv, colors)):
@@ -159,40 +161,3 @@ def _srgb(linear: NDArray[Any]) -> NDArray[np.uint8]:
     rgba[:, : linear.shape[1]] = np.clip(np.nan_to_num(linear / scale), 0.0, 1.0)
     rgba[:, :3] = linear_to_srgb(rgba[:, :3])
     return np.rint(rgba * 255.0).astype(np.uint8)
-
-
-def _base_texture(tree: dict[str, Any], material: int | None) -> dict[str, Any]:
-    if material is None:
-        return {}
-    return tree["materials"][material].get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
-
-
-def _materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
-    """Base colours; counts textures that can't be had and texture transforms that are ignored."""
-    result, changes = [], {"missing_textures": 0, "ignored_texture_transforms": 0}
-    pictures: dict[int, NDArray[np.uint8]] = {}
-    for index, material in enumerate(file.tree.get("materials", [])):
-        texture, picture = _base_texture(file.tree, index), None
-        if "index" in texture:
-            entry = file.tree["textures"][texture["index"]]
-            source = entry.get("source", entry.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-            if source is None:
-                changes["missing_textures"] += 1
-            else:
-                picture = pictures[source] = pictures[source] if source in pictures else _picture(file, source)
-            changes["ignored_texture_transforms"] += TRANSFORM in texture.get("extensions", {})
-        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-        red, green, blue, alpha = (min(max(float(value), 0.0), 1.0) for value in factor)
-        name = str(material.get("name", f"material_{index}"))
-        result.append(Material(name=name, base_color_factor=(red, green, blue, alpha), base_color=picture))
-    return result, changes
-
-
-def _picture(file: GltfFile, index: int) -> NDArray[np.uint8]:
-    image = file.tree["images"][index]
-    data = (
-        bytes(buffer_view(file, image["bufferView"])[0])
-        if "bufferView" in image
-        else read_resource(image["uri"], file.folder)
-    )
-    return decode_image(data)

@@ -1,0 +1,149 @@
+"""Materials of a glTF 2.0 file → PbrMaterial: all five textures with their samplers, placements and factors.
+
+Words of the specification (Khronos, glTF 2.0.1): texture, sampler, textureInfo.  What can't be kept is counted.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from .gltfbuffers import GltfFile, buffer_view, read_resource
+from .materials import SLOTS, UNTURNED, PbrMaterial, Picture, decode_image
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .materials import AlphaMode, Slot, Wrap
+
+TRANSFORM = "KHR_texture_transform"
+STRENGTH = "KHR_materials_emissive_strength"
+WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
+NEAREST = 9728
+ALPHA_MODES: tuple[AlphaMode, ...] = ("OPAQUE", "MASK", "BLEND")
+COUNTS = ("missing_textures", "textures_of_other_uv")
+
+
+def read_materials(file: GltfFile) -> tuple[list[PbrMaterial], dict[str, int]]:
+    """All materials of the file, and what could not be kept.
+
+    Counted are textures whose picture can't be had, and textures on another uv set than the material's first one.
+    Raises: MeshError for a picture that is none; lookup and value errors where the tree is damaged.
+    """
+    changes, pictures = dict.fromkeys(COUNTS, 0), {}
+    entries = enumerate(file.tree.get("materials", []))
+    return [_material(file, entry, index, pictures, changes) for index, entry in entries], changes
+
+
+def uv_set(material: dict[str, Any]) -> int:
+    """Number of the TEXCOORD that the material's textures are read with: that of its first one in slot order."""
+    infos = _texture_infos(material)
+    return next((_coordinates(infos[slot]) for slot in SLOTS if slot in infos), 0)
+
+
+def _texture_infos(material: dict[str, Any]) -> dict[Slot, dict[str, Any]]:
+    """The textureInfo of each slot that has one."""
+    surface = material.get("pbrMetallicRoughness", {})
+    infos: dict[Slot, dict[str, Any] | None] = {
+        "base-color": surface.get("baseColorTexture"),
+        "metallic-roughness": surface.get("metallicRoughnessTexture"),
+        "normal": material.get("normalTexture"),
+        "emissive": material.get("emissiveTexture"),
+        "occlusion": material.get("occlusionTexture"),
+    }
+    return {slot: info for slot, info in infos.items() if info is not None}
+
+
+def _coordinates(info: dict[str, Any]) -> int:
+    """The uv set of a textureInfo, which its transform may overrule."""
+    return int(info.get("extensions", {}).get(TRANSFORM, {}).get("texCoord", info.get("texCoord", 0)))
+
+
+def _material(
+    file: GltfFile,
+    entry: dict[str, Any],
+    index: int,
+    known: dict[int, NDArray[np.uint8]],
+    changes: dict[str, int],
+) -> PbrMaterial:
+    """One material; known and changes grow."""
+    infos, first = _texture_infos(entry), uv_set(entry)
+    pictures: dict[Slot, Picture] = {}
+    for slot, info in infos.items():
+        pixels = _pixels(file, info, known)
+        if pixels is None or _coordinates(info) != first:
+            changes["missing_textures" if pixels is None else "textures_of_other_uv"] += 1
+        else:
+            pictures[slot] = _picture(file, info, pixels)
+    surface = entry.get("pbrMetallicRoughness", {})
+    red, green, blue, alpha = (_unit(value) for value in surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
+    strength = max(float(entry.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0)), 0.0)
+    glow = tuple(_unit(value) * strength for value in entry.get("emissiveFactor", (0.0, 0.0, 0.0)))
+    mode = entry.get("alphaMode", "OPAQUE")
+    return PbrMaterial(
+        name=str(entry.get("name", f"material_{index}")),
+        base_color_factor=(red, green, blue, alpha),
+        base_color=pictures["base-color"].pixels if "base-color" in pictures else None,
+        pictures=pictures,
+        metallic=_unit(surface.get("metallicFactor", 1.0)),
+        roughness=_unit(surface.get("roughnessFactor", 1.0)),
+        normal_scale=float(infos.get("normal", {}).get("scale", 1.0)),
+        occlusion_strength=_unit(infos.get("occlusion", {}).get("strength", 1.0)),
+        emissive=(glow[0], glow[1], glow[2]),
+        alpha_mode=ALPHA_MODES[ALPHA_MODES.index(mode)],
+        alpha_cutoff=max(float(entry.get("alphaCutoff", 0.5)), 0.0),
+        double_sided=bool(entry.get("doubleSided", False)),
+    )
+
+
+def _unit(value: Any) -> float:
+    """A number of the file, limited to [0, 1]."""
+    return min(max(float(value), 0.0), 1.0)
+
+
+def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | None:
+    """The picture of a textureInfo, decoded once, or None where none that is read is named."""
+    texture = file.tree["textures"][info["index"]]
+    source = texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+    if source is None:
+        return None
+    if source not in known:
+        image = file.tree["images"][source]
+        embedded = "bufferView" in image
+        data = (
+            bytes(buffer_view(file, image["bufferView"])[0]) if embedded else read_resource(image["uri"], file.folder)
+        )
+        known[source] = decode_image(data)
+    return known[source]
+
+
+def _picture(file: GltfFile, info: dict[str, Any], pixels: NDArray[np.uint8]) -> Picture:
+    """The pixels with the sampler and the placement of the textureInfo."""
+    texture = file.tree["textures"][info["index"]]
+    sampler = file.tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
+    wrap = WRAPS[sampler.get("wrapS", 10497)], WRAPS[sampler.get("wrapT", 10497)]
+    placement = _placement(info.get("extensions", {}).get(TRANSFORM, {}))
+    return Picture(pixels, wrap, placement, smooth=sampler.get("magFilter") != NEAREST)
+
+
+def _placement(
+    transform: dict[str, Any],
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """KHR_texture_transform (v down: translate · rotate · scale) as rows for uv that are v up.
+
+    With v' = 1 − v the matrix keeps its form: both off-diagonal terms change sign, and the offset along v takes what
+    turning about the other corner moves.
+    """
+    if not transform:
+        return UNTURNED
+    shift_u, shift_v = (float(value) for value in transform.get("offset", (0.0, 0.0)))
+    scale_u, scale_v = (float(value) for value in transform.get("scale", (1.0, 1.0)))
+    angle = float(transform.get("rotation", 0.0))
+    cos, sin = math.cos(angle), math.sin(angle)
+    across = (cos * scale_u, sin * scale_v)
+    down = (-sin * scale_u, cos * scale_v)
+    return (
+        (across[0], -across[1], shift_u + across[1]),
+        (-down[0], down[1], 1.0 - shift_v - down[1]),
+    )
