@@ -1,0 +1,212 @@
+"""The paper's networks: Deform-, Wrap-, Cut- and Unwrap-Net (global), Embedding, Assign- and K pairs of nets (charts).
+
+n points · m lattice nodes · p charts · xyz in the unit ball · uv unnormalised · jets (3, …) = (value, ∂/∂u, ∂/∂v).
+``forward`` is what ships, in plain operations that can be exported.  ``run`` and ``jet`` are the same functions for
+training, where products between hidden layers may be bfloat16: coordinates enter and leave in float32, because
+eight bits of mantissa would round a point to 1/256 of the model.
+Initial weights and biases: uniform in ±1/√c_in, torch's default for the paper's layers.  It starts Cut- and Deform-Net
+close to the identity; the larger variance-preserving start was seen to crumple the surface before it is flat.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import leaky_relu
+
+from ..networks import Dense
+from .config import PaperNets
+
+
+class Affine(Dense):
+    """A Dense layer, or p side by side, with torch's default start; computes in the precision of its input."""
+
+    def __init__(self, inputs: int, outputs: int, *, copies: int | None = None, generator: torch.Generator) -> None:
+        super().__init__(inputs, outputs, copies=copies, gain=1.0 / 3.0, generator=generator)
+        bound = 1.0 / math.sqrt(inputs)
+        with torch.no_grad():
+            self.bias.copy_((torch.rand(self.bias.shape, generator=generator) * 2.0 - 1.0) * bound)
+
+    def run(self, x: Tensor) -> Tensor:
+        """(…, n, c_in) → (…, n, c_out) in x's dtype, bias included in the product."""
+        weight, bias = self.weight.to(x.dtype), self.bias.to(x.dtype)
+        if weight.ndim == 2:
+            return torch.addmm(bias, x, weight)
+        return torch.baddbmm(bias, x.expand(weight.shape[0], -1, -1), weight)
+
+    def run_jet(self, x: Tensor) -> Tensor:
+        """The same on jets (3, …, n, c): only the value gets the bias."""
+        bias = self.bias.to(x.dtype)
+        return x @ self.weight.to(x.dtype) + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+
+
+class LeakyPerceptron(nn.Module):
+    """Affine layers with LeakyReLU between them, none after the last (paper)."""
+
+    def __init__(
+        self, channels: tuple[int, ...], slope: float, *, copies: int | None = None, generator: torch.Generator
+    ) -> None:
+        super().__init__()
+        self.slope = slope
+        self.layers = nn.ModuleList(Affine(a, b, copies=copies, generator=generator) for a, b in pairwise(channels))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(…, n, channels[0]) → (…, n, channels[-1])."""
+        for layer in self.layers[:-1]:
+            x = leaky_relu(layer(x), self.slope)
+        return self.layers[-1](x)
+
+    def run(self, x: Tensor, dtype: torch.dtype, *, features: bool = False) -> Tensor:
+        """As forward, hidden products in ``dtype``; ``features``: the output is no coordinate, so it stays in dtype."""
+        first, *inner, last = self._affine()
+        x = leaky_relu(first.run(x).to(dtype), self.slope)
+        for layer in inner:
+            x = leaky_relu(layer.run(x), self.slope)
+        return last.run(x if features else x.float() if dtype == torch.bfloat16 else x)
+
+    def jet(self, x: Tensor, dtype: torch.dtype, *, features: bool = False) -> Tensor:
+        """As run, on jets (3, …, n, c)."""
+        first, *inner, last = self._affine()
+        x = leaky_jet(first.run_jet(x).to(dtype), self.slope)
+        for layer in inner:
+            x = leaky_jet(layer.run_jet(x), self.slope)
+        return last.run_jet(x if features else x.float() if dtype == torch.bfloat16 else x)
+
+    def _affine(self) -> list[Affine]:
+        return [layer for layer in self.layers if isinstance(layer, Affine)]
+
+
+def leaky_jet(x: Tensor, slope: float) -> Tensor:
+    """LeakyReLU of a jet: value and tangents times 1 where the value is positive, else times ``slope``."""
+    gain = (x[:1].detach() > 0.0).to(x.dtype).mul_(1.0 - slope).add_(slope)
+    return x * gain
+
+
+class CodedPerceptron(nn.Module):
+    """ξ″([ξ′(x); x]): a latent code beside the coordinates it was made from (paper: Deform-, Wrap- and Cut-Net)."""
+
+    def __init__(
+        self, inputs: int, outputs: int, hidden_layers: int, nets: PaperNets, *, generator: torch.Generator
+    ) -> None:
+        super().__init__()
+        hidden = (nets.hidden,) * hidden_layers
+        self.code = LeakyPerceptron((inputs, *hidden, nets.embedding), nets.slope, generator=generator)
+        self.decode = LeakyPerceptron((nets.embedding + inputs, *hidden, outputs), nets.slope, generator=generator)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(n, inputs) → (n, outputs)."""
+        return self.decode(torch.cat([self.code(x), x], dim=-1))
+
+    def run(self, x: Tensor, dtype: torch.dtype) -> Tensor:
+        """As forward; see LeakyPerceptron.run."""
+        return self.decode.run(torch.cat([self.code.run(x, dtype), x], dim=-1), dtype)
+
+    def jet(self, x: Tensor, dtype: torch.dtype) -> Tensor:
+        """As run, on jets (3, n, inputs)."""
+        return self.decode.jet(torch.cat([self.code.jet(x, dtype), x], dim=-1), dtype)
+
+
+def plane_jet(uv: Tensor) -> Tensor:
+    """A jet of uv (…, n, 2) along its own two directions: (3, …, n, 2)."""
+    unit = torch.eye(2, dtype=uv.dtype, device=uv.device)
+    axes = unit.view(2, *(1,) * (uv.ndim - 1), 2).expand(2, *uv.shape)
+    return torch.cat([uv[None], axes])
+
+
+class GlobalNetworks(nn.Module):
+    """The four networks of the global mode, shared between both branches."""
+
+    def __init__(self, nets: PaperNets, *, generator: torch.Generator) -> None:
+        super().__init__()
+        self.deform_net = CodedPerceptron(2, 2, 3, nets, generator=generator)
+        self.wrap_net = CodedPerceptron(2, 6, 3, nets, generator=generator)
+        self.cut_net = CodedPerceptron(3, 3, 2, nets, generator=generator)
+        self.unwrap_net = LeakyPerceptron((3, nets.hidden, nets.hidden, 2), nets.slope, generator=generator)
+        self.register_buffer("no_logit", torch.zeros((2, 1)), persistent=False)
+
+    def forward(self, xyz: Tensor) -> tuple[Tensor, Tensor]:
+        """Cut-Net, then Unwrap-Net: (n, 3) → logits (n, 1), all zero, and uv (n, 1, 2)."""
+        uv = self.unwrap_net(self.cut_net(xyz) + xyz)
+        return uv @ self.no_logit, uv.unsqueeze(1)
+
+    def flatten(self, xyz: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """P → Q, or P̂ → Q̂_cycle: (n, 3) → (n, 2)."""
+        return self.unwrap_net.run(self.cut_net.run(xyz, dtype) + xyz, dtype)
+
+    def deform(self, lattice: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """G → Q̂: (m, 2) → (m, 2)."""
+        return self.deform_net.run(lattice, dtype) + lattice
+
+    def fold(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """Wrap-Net: uv (n, 2) → position and normal (n, 6), the normal of any length."""
+        return self.wrap_net.run(uv, dtype)
+
+    def fold_jet(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """As fold, with derivatives by u and v: (3, n, 6)."""
+        return self.wrap_net.jet(plane_jet(uv), dtype)
+
+    def wrap(self, uv: Tensor, patch: Tensor) -> tuple[Tensor, Tensor]:
+        """The inverse map: uv (n, 2) → xyz (n, 3), unit normal (n, 3).  ``patch`` (n,) int64 is 0 everywhere."""
+        del patch
+        return _position_and_normal(self.wrap_net(uv))
+
+
+class MultiChartPaperNetworks(nn.Module):
+    """Embedding, Assign-Net and p Unwrap- and Wrap-Nets as batched products.
+
+    Decided: LeakyReLU follows the embedding, since two affine layers in a row would be one.  The Wrap-Nets are
+    [2, 512, 512, 512, 6], because the paper calls them lighter than the global one and gives no channels.
+    ``bidirectional``: p Deform-Nets [2, 512, 512, 512, 2] more, for the ablation.
+    """
+
+    def __init__(
+        self, charts: int, nets: PaperNets, *, generator: torch.Generator, bidirectional: bool = False
+    ) -> None:
+        super().__init__()
+        hidden, slope = nets.hidden, nets.slope
+        thrice = (hidden,) * 3
+        self.slope = slope
+        self.embedding = LeakyPerceptron((3, hidden, hidden), slope, generator=generator)
+        self.assign = LeakyPerceptron((hidden, hidden, charts), slope, generator=generator)
+        self.unwrap = LeakyPerceptron((*thrice, 2), slope, copies=charts, generator=generator)
+        self.wrap_net = LeakyPerceptron((2, *thrice, 6), slope, copies=charts, generator=generator)
+        if bidirectional:
+            self.deform_net = LeakyPerceptron((2, *thrice, 2), slope, copies=charts, generator=generator)
+
+    def forward(self, xyz: Tensor) -> tuple[Tensor, Tensor]:
+        """(n, 3) → logits (n, p) and the uv of every chart (n, p, 2)."""
+        feature = leaky_relu(self.embedding(xyz), self.slope)
+        return self.assign(feature), self.unwrap(feature).transpose(0, 1)
+
+    def flatten(self, xyz: Tensor, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor]:
+        """Logits (n, p) and uv (p, n, 2) of points (n, 3), or (p, n, 3) with points of its own for each chart."""
+        feature = leaky_relu(self.embedding.run(xyz, dtype, features=True), self.slope)
+        return self.assign.run(feature, dtype), self.unwrap.run(feature, dtype)
+
+    def deform(self, lattice: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """G → Q̂ of each chart: (m, 2) → (p, m, 2)."""
+        return self.deform_net.run(lattice, dtype) + lattice
+
+    def fold(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """Wrap-Nets: uv (p, n, 2) → positions and normals (p, n, 6), normals of any length."""
+        return self.wrap_net.run(uv, dtype)
+
+    def fold_jet(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
+        """As fold, with derivatives by u and v: (3, p, n, 6)."""
+        return self.wrap_net.jet(plane_jet(uv), dtype)
+
+    def wrap(self, uv: Tensor, patch: Tensor) -> tuple[Tensor, Tensor]:
+        """The inverse map: uv (n, 2) of charts ``patch`` (n,) int64 → xyz (n, 3), unit normal (n, 3)."""
+        every = self.wrap_net(uv).transpose(0, 1)
+        return _position_and_normal(torch.take_along_dim(every, patch[:, None, None], dim=1)[:, 0])
+
+
+PaperNetworks = GlobalNetworks | MultiChartPaperNetworks
+
+
+def _position_and_normal(folded: Tensor) -> tuple[Tensor, Tensor]:
+    position, normal = torch.split(folded, 3, dim=-1)
+    return position, nn.functional.normalize(normal, dim=-1)
