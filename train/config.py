@@ -20,7 +20,7 @@ class NetConfig:
     """Hidden layers of the deployed Assign-Net."""
     octaves: int = 6
     """Fourier octaves of the deployed Assign-Net's input."""
-    unwrap_octaves: int = 1
+    unwrap_octaves: int = 2
     """Fourier octaves of the deployed Unwrap-Nets' input."""
 
 
@@ -172,9 +172,9 @@ class FitConfig:
 
     samples: int = 60000
     """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
-    unwrap_steps: int = 300
+    unwrap_steps: int = 500
     """Optimizer steps of the Unwrap-Nets."""
-    unwrap_batch: int = 128
+    unwrap_batch: int = 64
     """Samples a step and patch."""
     assign_steps: int = 700
     """Optimizer steps of the Assign-Net."""
@@ -182,8 +182,8 @@ class FitConfig:
     """Samples a step."""
     seam_share: float = 0.6
     """Share of the Assign-Net's samples that lie close to seams."""
-    seam_reach: float = 0.008
-    """Standard deviation of their distance from the seam."""
+    seam_reach: float = 0.03
+    """Greatest distance of these from the seam."""
     thin_reach: float = 0.06
     """Distance within which the surface counts as close to itself."""
     tolerance: float = 0.002

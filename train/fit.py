@@ -91,7 +91,7 @@ def solve_last_layer(networks: AtlasNetworks, samples: PatchSamples) -> None:
 def sample_seams(
     surface: Surface, charts: Charts, count: int, reach: float, rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Points beside seams, at normally distributed distances: their faces (count,) and barycentrics (count, 3).
+    """Points beside seams, evenly up to ``reach`` from them: their faces (count,) and barycentrics (count, 3).
 
     No points where there is no seam.
     """
@@ -106,7 +106,7 @@ def sample_seams(
     height = 2.0 * surface.face_areas()[face] / np.maximum(length, 1e-300)
     cumulative = np.cumsum(length)
     pick = np.searchsorted(cumulative, rng.random(count) * cumulative[-1]).clip(max=len(half) - 1)
-    depth = np.minimum(np.abs(rng.normal(size=count)) * reach / np.maximum(height[pick], 1e-300), 1.0)
+    depth = np.minimum(rng.random(count) * reach / np.maximum(height[pick], 1e-300), 1.0)
     along = rng.random(count)
     barycentric = np.zeros((count, 3))
     for i, weight in enumerate(((1.0 - along) * (1.0 - depth), along * (1.0 - depth), depth)):
