@@ -41,6 +41,8 @@ PNG_LEVEL = 3
 EXR_COMPRESSION = "zip:2"
 PNG_CHUNKS = (b"IHDR", b"IDAT", b"IEND")
 HALF_MAX = 65504.0
+NO_DATE = "1970:01:01 00:00:00"
+"""Without a date OpenImageIO writes that of the clock into EXR files, and same pixels give other bytes."""
 STRAIGHT_ALPHA = "oiio:UnassociatedAlpha"
 """Without this word OpenImageIO divides or multiplies the colours of a PNG by its alpha."""
 
@@ -108,7 +110,9 @@ def write_exr(texture: Texture, path: Path, *, bits: Bits | None = None) -> None
             raise EncodingError(f"values reach beyond ±{HALF_MAX:.0f}, the range of half; write the EXR with 32 bits")
         pixels = pixels.astype(np.float16)
     texts = {f"flexpara:{key}": value for key, value in texture.metadata.items()}
-    _write(path, pixels, {"compression": EXR_COMPRESSION, "oiio:ColorSpace": "lin_rec709", **texts})
+    _write(
+        path, pixels, {"compression": EXR_COMPRESSION, "oiio:ColorSpace": "lin_rec709", "DateTime": NO_DATE, **texts}
+    )
 
 
 def quantize(texture: Texture, *, bits: Bits | None = None) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -1,48 +1,169 @@
-"""The source's colour on the new uv: its texture looked up through the old uv, its vertex colours, its factors.
+"""Pictures of the source looked up through its old uv: wrapped, decoded and filtered by the footprint of each texel.
 
-t texels · n file vertices · h w source texels.  The two atlases lie on the same faces, so no search is needed: the
-G-buffer names face and place, the old uv follow by interpolation.  Filtering is bilinear in linear light, wrapping
-repeats (the glTF default).
+t texels · f faces · h w source texels.  Both atlases lie on the same faces, so no search is needed: the G-buffer names
+face and place, the old uv follow.  uv are v up, row 0 of a picture is its top.
+
+A new texel is a parallelogram in the old picture, the same for all texels of a face.  It is averaged over a grid of up
+to `MOST` × `MOST` points with spacing of at most one source texel, on a smaller picture where that is not enough; where
+the new texel is the smaller one, one bilinear look-up is all.  Colours are averaged in linear light, normals as
+vectors.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..runtime.mesh import Material
 from .color import byte_to_linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..runtime.mesh import Asset, Atlas
-    from .gbuffer import GBuffer
+    from ..runtime.materials import Picture, Wrap
+
+MOST = 8
+"""Points along each side of a texel's footprint."""
+Decoding = Literal["color", "data", "signed"]
 
 
-def source_color(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-    """(h, w, 4) float32 linear RGBA: factor × (texture, else vertex colour, else white); 0 where nothing is."""
-    height, width = gbuffer.shape
-    result = np.zeros((height * width, 4), np.float32)
-    corners = atlas.source_vertex[atlas.faces]
-    materials = asset.materials or (Material(),)
-    face_material = asset.face_material if asset.face_material is not None else np.zeros(len(corners), np.int64)
-    colors = None if asset.colors is None else linear_colors(asset.colors)
-    for texels in gbuffer.chunks():
-        material_of = face_material[gbuffer.face.reshape(-1)[texels]]
-        for index in np.unique(material_of):
-            chosen = texels[material_of == index]
-            material = materials[int(index)]
-            factor = np.asarray(material.base_color_factor, np.float32)
-            if material.base_color is not None and asset.uv is not None:
-                uv = gbuffer.interpolate(asset.uv - np.floor(asset.uv.min(axis=0)), corners, chosen)
-                result[chosen] = factor * sample_bilinear(material.base_color, uv)
-            elif colors is not None:
-                result[chosen] = factor * gbuffer.interpolate(colors, corners, chosen)
-            else:
-                result[chosen] = factor
-    return result.reshape(height, width, 4)
+@dataclass(frozen=True, eq=False)
+class SourceTexture:
+    """A picture that is ready to be sampled.
+
+    picture: pixels, wrap modes, placement.  decoding: color is sRGB → linear light, data is [0, 1], signed is [−1, 1];
+    the fourth channel is [0, 1] in all.
+    """
+
+    picture: Picture
+    decoding: Decoding
+
+    @cached_property
+    def curve(self) -> NDArray[np.float32]:
+        """(256,) float32: value of each level of the first three channels."""
+        level = np.arange(256, dtype=np.float32) / np.float32(255.0)
+        return {"color": byte_to_linear(), "data": level, "signed": level * 2 - 1}[self.decoding]
+
+    def decoded(self, pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """(…, 4) uint8 → float32 values."""
+        values = self.curve[pixels]
+        values[..., 3] = pixels[..., 3] / np.float32(255.0)
+        return values
+
+    @cached_property
+    def _smaller(self) -> list[NDArray[np.float32]]:
+        """Halved pictures made so far, the first one half the size: a cache of `level`."""
+        return []
+
+    def level(self, number: int) -> NDArray[np.uint8] | NDArray[np.float32]:
+        """Picture halved `number` times by 2 × 2 means, at least one texel a side; level 0 is as stored, uint8."""
+        while len(self._smaller) < number:
+            last = self._smaller[-1] if self._smaller else self.decoded(self.picture.pixels)
+            self._smaller.append(halved(last))
+        return self.picture.pixels if number == 0 else self._smaller[number - 1]
+
+    def sample(self, uv: NDArray[np.float64], number: int) -> NDArray[np.float32]:
+        """(t, 4) float32 at picture uv (t, 2), bilinear on a level (nearest where the picture is not smooth)."""
+        image = self.level(number)
+        height, width = image.shape[:2]
+        flat = image.reshape(-1, 4)
+        x, y = uv[:, 0] * width - 0.5, (1.0 - uv[:, 1]) * height - 0.5
+        if not self.picture.smooth:
+            row, column = self._wrapped(np.rint(y), 1, height), self._wrapped(np.rint(x), 0, width)
+            return self._texels(flat, row * width + column)
+        left, top = np.floor(x), np.floor(y)
+        across, down = (x - left).astype(np.float32)[:, None], (y - top).astype(np.float32)[:, None]
+        columns = [self._wrapped(left + step, 0, width) for step in (0, 1)]
+        rows = [self._wrapped(top + step, 1, height) * width for step in (0, 1)]
+        upper, lower = (
+            self._texels(flat, row + columns[0]) * (1 - across) + self._texels(flat, row + columns[1]) * across
+            for row in rows
+        )
+        return upper * (1 - down) + lower * down
+
+    def _wrapped(self, index: NDArray[np.float64], axis: int, count: int) -> NDArray[np.int64]:
+        """(t,) texel numbers of whole numbers that may lie outside [0, count)."""
+        return wrapped(index, count, self.picture.wrap[axis])
+
+    def _texels(self, flat: NDArray[np.uint8] | NDArray[np.float32], index: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(t, 4) float32 values of single texels."""
+        values: NDArray[Any] = flat.take(index, axis=0)
+        return self.decoded(values) if values.dtype == np.uint8 else values
+
+
+class FootprintSampler:
+    """A texture with the footprints that the new texels of each face have in it."""
+
+    def __init__(self, texture: SourceTexture, axes: NDArray[np.float64]) -> None:
+        """Prepare.  axes: (f, 2, 2) float64 as from `texel_axes`."""
+        place = np.asarray(texture.picture.placement)
+        height, width = texture.picture.pixels.shape[:2]
+        self.texture, self.place = texture, place
+        self.steps = axes @ place[:, :2].T
+        self.counts, self.levels = footprint_grids(self.steps * np.array([width, height], np.float64))
+        self.kind = np.log2(self.counts).astype(np.int64) @ np.array([1, 8]) + 64 * self.levels
+
+    def make_levels(self, faces: NDArray[np.int64]) -> None:
+        """Make the smaller pictures that these faces (m,) need, so that threads only read them."""
+        self.texture.level(int(self.levels[faces].max(initial=0)))
+
+    def sample(self, uv: NDArray[np.float64], face: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(t, 4) float32 means over the footprints of texels with centres at old uv (t, 2) on faces (t,)."""
+        uv = uv @ self.place[:, :2].T + self.place[:, 2]
+        kind = self.kind[face]
+        result = np.zeros((len(uv), 4), np.float32)
+        for key in np.unique(kind):
+            chosen = np.flatnonzero(kind == key)
+            step, (across, down) = self.steps[face[chosen]], self.counts[face[chosen[0]]]
+            total = np.zeros((len(chosen), 4), np.float32)
+            for right in (np.arange(across) + 0.5) / across - 0.5:
+                for below in (np.arange(down) + 0.5) / down - 0.5:
+                    point = uv[chosen] + right * step[:, 0] + below * step[:, 1]
+                    total += self.texture.sample(point, int(key) // 64)
+            result[chosen] = total / np.float32(across * down)
+        return result
+
+
+def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """(f, 2, 2) float64: change of the old uv by one texel to the right (row 0) and one down (row 1), per face.
+
+    new_uv, old_uv: (f, 3, 2) float64, v up.  size: texels per side of the new atlas.  Zero for a face that has no area
+    in the new uv.
+    """
+    new = (new_uv[:, 1:] - new_uv[:, :1]) * np.array([size, -size], np.float64)
+    old = old_uv[:, 1:] - old_uv[:, :1]
+    area = new[:, 0, 0] * new[:, 1, 1] - new[:, 0, 1] * new[:, 1, 0]
+    inverse = np.stack([new[:, 1, 1], -new[:, 0, 1], -new[:, 1, 0], new[:, 0, 0]], axis=1).reshape(-1, 2, 2)
+    usable = np.abs(area) > 1e-12
+    return np.where(usable[:, None, None], inverse / np.where(usable, area, 1.0)[:, None, None], 0.0) @ old
+
+
+def footprint_grids(axes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """How footprints (f, 2, 2), in source texels, are sampled: points per side (f, 2), powers of 2, and level (f,)."""
+    length = np.linalg.norm(axes, axis=2)
+    wanted = np.ceil(np.log2(np.maximum(length, 1.0)) - 1e-9)
+    counts = np.exp2(np.minimum(wanted, np.log2(MOST))).astype(np.int64)
+    spacing = (length / counts).max(axis=1)
+    return counts, np.clip(np.rint(np.log2(np.maximum(spacing, 1.0))), 0, 32).astype(np.int64)
+
+
+def wrapped(index: NDArray[np.float64], count: int, wrap: Wrap) -> NDArray[np.int64]:
+    """(t,) int64 in [0, count) of any whole numbers (glTF 2.0, samplers; OpenGL's wrap modes of the same names)."""
+    if wrap == "clamp":
+        return np.clip(index, 0, count - 1).astype(np.int64)
+    if wrap == "repeat":
+        return np.mod(index, count).astype(np.int64)
+    turn = np.mod(index, 2 * count)
+    return np.where(turn < count, turn, 2 * count - 1 - turn).astype(np.int64)
+
+
+def halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(⌈h/2⌉, ⌈w/2⌉, c) float32 means of 2 × 2 texels; an odd last row or column stands for two."""
+    height, width = image.shape[:2]
+    even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    return (even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]) / np.float32(4.0)
 
 
 def linear_colors(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -50,22 +171,3 @@ def linear_colors(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
     linear = byte_to_linear()[colors]
     linear[..., 3] = colors[..., 3] / np.float32(255.0)
     return linear
-
-
-def sample_bilinear(image: NDArray[np.uint8], uv: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(t, 4) float32 linear RGBA of a (h, w, 4) uint8 sRGB image, row 0 = top, at uv (t, 2), v up, repeated."""
-    height, width = image.shape[:2]
-    x = np.mod(uv[:, 0].astype(np.float64), 1.0) * width - 0.5
-    y = np.mod(1.0 - uv[:, 1].astype(np.float64), 1.0) * height - 0.5
-    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    across, down = (x - left).astype(np.float32)[:, None], (y - top).astype(np.float32)[:, None]
-    right, bottom = (left + 1) % width, (top + 1) % height
-    left, top = left % width, top % height
-    upper = _texel(image, top, left) * (1.0 - across) + _texel(image, top, right) * across
-    lower = _texel(image, bottom, left) * (1.0 - across) + _texel(image, bottom, right) * across
-    return upper * (1.0 - down) + lower * down
-
-
-def _texel(image: NDArray[np.uint8], row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.float32]:
-    """(t, 4) float32 linear RGBA of single texels."""
-    return linear_colors(image[row, column])

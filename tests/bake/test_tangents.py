@@ -2,16 +2,101 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flexpara.bake.tangents import any_perpendicular, corner_angles, unit, vertex_tangents
+from flexpara.bake.tangents import (
+    any_perpendicular,
+    corner_angles,
+    mikk_tangents,
+    split_by_tangents,
+    unit,
+    vertex_tangents,
+)
 from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
+
+MIKKTSPACE = Path(__file__).with_name("mikktspace.mjs")
+
+
+def reference_tangents(atlas: Atlas, folder: Path) -> np.ndarray:
+    """(f, 3, 4) tangents of npm's mikktspace, v up; skips where node or the package is absent."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    corners = [array[atlas.faces].astype(np.float32).ravel() for array in (atlas.positions, atlas.normals, atlas.uv)]
+    np.concatenate(corners).tofile(folder / "in.f32")
+    command = [node, str(MIKKTSPACE), str(folder / "in.f32"), str(folder / "out.f32")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    if "Cannot find module 'mikktspace'" in done.stderr:
+        pytest.skip("npm package mikktspace is not installed")
+    assert done.returncode == 0, done.stderr
+    return np.fromfile(folder / "out.f32", np.float32).reshape(-1, 3, 4)
+
+
+def assert_same_tangents(found: np.ndarray, expected: np.ndarray) -> None:
+    np.testing.assert_allclose(found[..., :3], expected[..., :3], atol=2e-5)
+    np.testing.assert_array_equal(found[..., 3], expected[..., 3])
+
+
+def mirrored(atlas: Atlas) -> Atlas:
+    """The right half of the uv folded onto the left one: vertices on the fold belong to faces of both kinds."""
+    return replace(atlas, uv=np.column_stack([np.abs(atlas.uv[:, 0] - 0.5), atlas.uv[:, 1]]).astype(np.float32))
+
+
+def uneven(atlas: Atlas) -> Atlas:
+    """Moves uv by a tenth of a cell, so that the faces around a vertex disagree about u."""
+    shift = np.random.default_rng(5).normal(0.0, 0.004, atlas.uv.shape)
+    return replace(atlas, uv=(atlas.uv + shift).astype(np.float32))
+
+
+def test_they_are_those_of_mikktspace(sphere: Pair, tmp_path: Path) -> None:
+    atlas = uneven(sphere[0])
+    expected = reference_tangents(atlas, tmp_path)
+    assert_same_tangents(vertex_tangents(atlas)[atlas.faces], expected)
+    assert_same_tangents(mikk_tangents(atlas.positions, atlas.normals, atlas.uv, atlas.faces), expected)
+
+
+def test_they_are_those_of_mikktspace_where_uv_are_mirrored(sphere: Pair, tmp_path: Path) -> None:
+    atlas = mirrored(sphere[0])
+    expected = reference_tangents(atlas, tmp_path)
+    assert_same_tangents(mikk_tangents(atlas.positions, atlas.normals, atlas.uv, atlas.faces), expected)
+    split = split_by_tangents(atlas)
+    assert_same_tangents(vertex_tangents(split)[split.faces], expected)
+    assert (vertex_tangents(atlas)[atlas.faces][..., 3] != expected[..., 3]).any()  # why it is split
+
+
+def test_split_vertices_are_one_point_without_a_seam_for_mikktspace(sphere: Pair, tmp_path: Path) -> None:
+    """Equal position, normal and uv are one vertex, whatever the index says."""
+    atlas = uneven(sphere[0])
+    loose = replace(
+        atlas,
+        faces=np.arange(atlas.faces.size).reshape(-1, 3),
+        **{name: getattr(atlas, name)[atlas.faces.ravel()] for name in ("positions", "normals", "uv", "source_vertex")},
+    )
+    expected = reference_tangents(loose, tmp_path)
+    assert_same_tangents(vertex_tangents(loose)[loose.faces], expected)
+
+
+def test_an_atlas_of_one_orientation_is_not_split(sphere: Pair) -> None:
+    assert split_by_tangents(sphere[0]) is sphere[0]
+
+
+def test_splitting_keeps_the_faces_where_they_are(sphere: Pair) -> None:
+    atlas = mirrored(sphere[0])
+    split = split_by_tangents(atlas)
+    assert len(split.positions) > len(atlas.positions)
+    np.testing.assert_array_equal(split.positions[split.faces], atlas.positions[atlas.faces])
+    np.testing.assert_array_equal(split.uv[split.faces], atlas.uv[atlas.faces])
+    np.testing.assert_array_equal(split.source_vertex[split.faces], atlas.source_vertex[atlas.faces])
+    assert split_by_tangents(split) is split
 
 
 def test_the_tangent_of_a_flat_quad_is_its_u_direction(quad: Pair) -> None:
@@ -53,7 +138,8 @@ def test_frames_are_orthonormal_and_the_bitangent_runs_along_v(sphere: Pair) -> 
 def test_the_angles_of_a_flat_triangle_sum_to_pi(pair: Callable[..., Pair]) -> None:
     atlas, _ = pair([[0, 0, 0], [3, 0, 0], [1, 2, 0]], [[0, 1, 2]], [[0, 0], [1, 0], [0, 1]])
     normal = atlas.normals.astype(np.float64)
-    assert sum(corner_angles(atlas, normal, corner)[0] for corner in range(3)) == pytest.approx(np.pi)
+    corners = atlas.positions[atlas.faces]
+    assert sum(corner_angles(corners, normal[:1], corner)[0] for corner in range(3)) == pytest.approx(np.pi)
 
 
 def test_weights_are_angles_so_that_cutting_a_face_in_two_changes_nothing(pair: Callable[..., Pair]) -> None:
