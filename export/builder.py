@@ -65,6 +65,7 @@ class GraphBuilder:
         ir_version: int,
         producer: tuple[str, str],
         metadata: dict[str, str],
+        name: str = "unwrap",
     ) -> bytes:
         """The finished model, checked by onnx with full shape inference.
 
@@ -75,6 +76,7 @@ class GraphBuilder:
             ir_version: ONNX IR version.
             producer: name and version.
             metadata: key → text, stored as metadata_props.
+            name: of the graph.
 
         Raises:
             FlexparaError: the nodes don't fit together.
@@ -83,7 +85,7 @@ class GraphBuilder:
         def ends(side: Ends) -> list[ValueInfoProto]:
             return [helper.make_tensor_value_info(name, ELEMENT_TYPES[t], shape) for name, (t, shape) in side.items()]
 
-        graph = helper.make_graph(self.nodes, "unwrap", ends(inputs), ends(outputs), self.initializers)
+        graph = helper.make_graph(self.nodes, name, ends(inputs), ends(outputs), self.initializers)
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=ir_version)
         model.producer_name, model.producer_version = producer
         helper.set_model_props(model, metadata)

@@ -29,6 +29,14 @@ class Value(NamedTuple):
     rank: int
 
 
+class Pieces(NamedTuple):
+    """A tensor cut into pieces of ``size`` along axis ``dim``; piece i is written when it is asked for."""
+
+    whole: Value
+    size: int
+    dim: int
+
+
 class _Flat(fx.Tracer):
     """Looks inside every module, so that only functions are left."""
 
@@ -98,7 +106,7 @@ class Lowering:
 
     def _operation(self, node: fx.Node) -> Any:
         arguments: Any = fx.map_arg((node.args, node.kwargs), self._value)
-        if any(isinstance(self._known[parent], Value) for parent in node.all_input_nodes):
+        if any(isinstance(self._known[parent], Value | Pieces) for parent in node.all_input_nodes):
             return _write(self._builder, node, *arguments)
         return _call(node, *arguments)
 
@@ -120,7 +128,7 @@ def _call(node: fx.Node, positional: tuple[Any, ...], named: dict[str, Any]) -> 
     return node.target(*positional, **named)
 
 
-def _write(builder: GraphBuilder, node: fx.Node, positional: tuple[Any, ...], named: dict[str, Any]) -> Value:
+def _write(builder: GraphBuilder, node: fx.Node, positional: tuple[Any, ...], named: dict[str, Any]) -> Value | Pieces:
     """Append the ONNX twin of one operation."""
     kind = node.target if isinstance(node.target, str) else getattr(node.target, "__name__", str(node.target))
     known = ", ".join(sorted(_OPERATIONS))
@@ -224,12 +232,66 @@ def _einsum(builder: GraphBuilder, equation: str, *operands: Operand) -> Value:
     return Value(builder.op("Einsum", *names, equation=equation), len(equation.rpartition("->")[2].strip()))
 
 
-_OPERATIONS: dict[str, Callable[..., Value]] = {
+def _squeeze(builder: GraphBuilder, x: Value, dim: int) -> Value:
+    return Value(builder.op("Squeeze", x.name, builder.axes(dim)), x.rank - 1)
+
+
+def _slice(builder: GraphBuilder, x: Value, start: int, stop: int, axis: int) -> Value:
+    return Value(builder.op("Slice", x.name, *(builder.axes(i) for i in (start, stop, axis))), x.rank)
+
+
+def _getitem(builder: GraphBuilder, x: Value | Pieces, key: Any) -> Value:
+    """Indexing by integers, slices of step 1 and an ellipsis; piece ``key`` of a split."""
+    if isinstance(x, Pieces):
+        return _slice(builder, x.whole, key * x.size, (key + 1) * x.size, x.dim)
+    parts: tuple[Any, ...] = key if isinstance(key, tuple) else (key,)
+    if Ellipsis in parts:
+        at, missing = parts.index(Ellipsis), x.rank - len(parts) + 1
+        parts = (*parts[:at], *[slice(None)] * missing, *parts[at + 1 :])
+    axis = 0
+    for part in parts:
+        if isinstance(part, int):
+            index = builder.constant(np.asarray(part, dtype=np.int64))
+            x = Value(builder.op("Gather", x.name, index, axis=axis), x.rank - 1)
+        elif isinstance(part, slice) and part.step in (None, 1):
+            if part != slice(None):
+                stop = np.iinfo(np.int64).max if part.stop is None else part.stop
+                x = _slice(builder, x, part.start or 0, int(stop), axis)
+            axis += 1
+        else:
+            raise FlexparaError(f"the model indexes by {part!r}, expected integers and slices of step 1; rewrite it")
+    return x
+
+
+def _split(builder: GraphBuilder, x: Value, split_size_or_sections: int, dim: int = 0) -> Pieces:
+    return Pieces(x, split_size_or_sections, dim)
+
+
+def _take_along_dim(builder: GraphBuilder, x: Value, indices: Tensor, dim: int) -> Value:
+    """One constant index for all: the axis stays, of length 1."""
+    if indices.numel() != 1:
+        found = f"indices of shape {tuple(indices.shape)}"
+        raise FlexparaError(f"the model takes {found} along an axis, expected one constant index; gather outside")
+    return Value(builder.op("Gather", x.name, builder.axes(int(indices)), axis=dim), x.rank)
+
+
+def _normalize(
+    builder: GraphBuilder, x: Value, p: float = 2.0, dim: int = 1, eps: float = 1e-12, out: None = None
+) -> Value:
+    if p != 2.0:
+        raise FlexparaError(f"the model normalizes by a {p}-norm, expected p = 2; rewrite it")
+    length = builder.op("ReduceL2", x.name, builder.axes(dim), keepdims=1)
+    floor = builder.constant(np.asarray(eps, dtype=np.float32))
+    return Value(builder.op("Div", x.name, builder.op("Max", length, floor)), x.rank)
+
+
+_OPERATIONS: dict[str, Callable[..., Value | Pieces]] = {
     **{kind: _unary(kind.capitalize()) for kind in ("relu", "sigmoid", "tanh", "sin", "cos", "exp", "neg", "softplus")},
     **{kind: _binary(kind.capitalize()) for kind in ("add", "sub", "mul", "div")},
     **{"truediv": _binary("Div"), "matmul": _matmul, "bmm": _matmul, "linear": _linear, "baddbmm": _baddbmm},
     **{"silu": _silu, "leaky_relu": _leaky_relu, "einsum": _einsum},
     **{"cat": _concatenate, "concat": _concatenate, "stack": _stack, "unsqueeze": _unsqueeze, "expand": _expand},
-    **{"transpose": _transpose, "permute": _permute},
+    **{"transpose": _transpose, "permute": _permute, "squeeze": _squeeze},
+    **{"getitem": _getitem, "split": _split, "take_along_dim": _take_along_dim, "normalize": _normalize},
 }
 """Name of the torch function or method → its twin.  Signatures are torch's; what they leave out is refused."""

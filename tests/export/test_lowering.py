@@ -79,6 +79,17 @@ OPERATIONS: dict[str, Callable[[Tensor], Tensor]] = {
     "concatenation with a constant factor": lambda x: torch.cat([x, torch.sin(x * 3.0), x * ROW[:3]], dim=-1),
     "stack": lambda x: torch.stack([x, x * x], dim=1),
     "stack on a new last axis": lambda x: torch.stack([x, x * x], dim=-1),
+    "squeeze": lambda x: (x.unsqueeze(1) @ MATRIX).squeeze(1),
+    "column": lambda x: x[:, 1],
+    "range of columns": lambda x: x[:, :2],
+    "last columns": lambda x: x[:, 1:],
+    "columns behind an ellipsis": lambda x: (x @ STACK)[..., 1:3],
+    "one of a stack": lambda x: (x @ STACK)[1, :, 2:],
+    "first of a tuple of pieces": lambda x: torch.split(x @ MATRIX, 2, dim=-1)[0],
+    "second of a tuple of pieces": lambda x: torch.split(x @ MATRIX, 3, dim=-1)[1],
+    "one index along an axis": lambda x: torch.take_along_dim(x @ STACK, torch.ones((1, 1, 1), dtype=torch.int64), 0),
+    "normalize": lambda x: functional.normalize(x, dim=-1),
+    "normalize nothing": lambda x: functional.normalize(x * 0.0, dim=-1),
 }
 
 
@@ -142,8 +153,11 @@ def test_what_a_result_does_not_need_is_not_written() -> None:
         (lambda x: torch.add(x, x, alpha=2), "add: got an unexpected keyword argument 'alpha'"),
         (lambda x: x if x.sum() > 0 else -x, "can't be traced"),
         (lambda x: MATRIX, "result 1 of the model is constant"),
+        (lambda x: x[:, ::2], "indexes by slice"),
+        (lambda x: functional.normalize(x, p=1.0), "normalizes by a 1.0-norm"),
+        (lambda x: torch.take_along_dim(x, torch.zeros((2, 3), dtype=torch.int64), 1), "takes indices of shape"),
     ],
-    ids=["unknown operation", "unknown option", "branch on values", "constant"],
+    ids=["unknown operation", "unknown option", "branch on values", "constant", "stride", "norm", "indices"],
 )
 def test_what_has_no_twin_is_refused_by_name(function: Callable[[Tensor], Tensor], message: str) -> None:
     with pytest.raises(FlexparaError, match=message) as caught:
