@@ -73,8 +73,8 @@ class Batch:
     """The part of the input that one step uses.
 
     xyz (b, 3) float32.  normal (b, 3) or None.  triangles (t, 3) int64 into b, or None, with their angles (t, 3) in
-    radians.  edges (e, 2) int64 into b with lengths (e,).  edge_total: edges of the whole input, each counted
-    once a triangle.  near: the points, ready to be asked for neighbours.
+    radians.  edges (e, 2) int64 into b with lengths (e,).  near: the points, ready to be asked for neighbours.
+    total: n, points of the whole input.  edge_total: its edges, each counted once a triangle.
     """
 
     xyz: Tensor
@@ -83,8 +83,9 @@ class Batch:
     angles: Tensor | None
     edges: Tensor
     lengths: Tensor
-    edge_total: int
     near: Neighbourhood
+    total: int
+    edge_total: int
 
 
 class BatchSource:
@@ -135,7 +136,7 @@ class BatchSource:
             total = 3 * total
         lengths = (xyz[edges[:, 0]] - xyz[edges[:, 1]]).norm(dim=1)
         normal = None if self._normal is None else self._normal[index.to(self._device)]
-        return Batch(xyz, normal, triangles, angles, edges, lengths, total, Neighbourhood(xyz))
+        return Batch(xyz, normal, triangles, angles, edges, lengths, Neighbourhood(xyz), len(self._xyz), total)
 
 
 def cloud_edges(points: Tensor, count: int) -> Tensor:

@@ -7,8 +7,8 @@ Details" unless said otherwise); "decided" = the paper is silent, and the docstr
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from typing import Any, Literal
 
 from ...runtime.errors import InputError
 
@@ -105,15 +105,15 @@ class PaperConfig:
     cut_share: float = 0.02
     """τ as a share of the uv box (paper)."""
     epsilon: float = 0.2
-    """ε in units of L(Q)/√N (paper)."""
+    """ε in units of L(Q)/√N (paper); N counts all points of the input, also where a step sees only some (decided)."""
     edge_neighbours: int = 6
     """Neighbours in space that a point cloud's points are joined with (decided: a triangle mesh has six a vertex)."""
     dtype: Literal["float32", "bfloat16"] = "float32"
     """Of products between hidden layers; coordinates, Jacobians and losses stay float32."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """auto: CUDA where there is one."""
-    compile: bool = True
-    """On CUDA: torch.compile the networks.  Never on the CPU."""
+    compile: bool = False
+    """On CUDA: torch.compile the networks (decided: off until it was seen to pay).  Never on the CPU."""
     nets: PaperNets = field(default_factory=PaperNets)
     global_weights: GlobalWeights = field(default_factory=GlobalWeights)
     chart_weights: MultiChartWeights = field(default_factory=MultiChartWeights)
@@ -128,15 +128,19 @@ class PaperConfig:
         _known("mode", self.mode, ("global", "multi-chart"))
         _known("dtype", self.dtype, ("float32", "bfloat16"))
         _known("device", self.device, ("auto", "cpu", "cuda"))
-        for name in ("charts", "steps", "neighbours", "edge_neighbours", "cut_neighbours"):
-            _at_least(name, getattr(self, name), 1)
-        _at_least("points", self.points, 16)
-        _at_least("nets.hidden", self.nets.hidden, 1)
-        _at_least("nets.embedding", self.nets.embedding, 1)
-        for name in ("rate", "final_rate", "decay", "epsilon"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(f"{name} is {value}, expected a finite number ≥ 0; choose another")
+        _within("charts", self.charts, 1, 256)
+        _within("seed", self.seed, 0, 2**63 - 1)
+        _within("steps", self.steps, 1, 99_999_999)
+        _within("points", self.points, 16, 1_000_000)
+        for name in ("neighbours", "edge_neighbours", "cut_neighbours"):
+            _within(name, getattr(self, name), 1, 1000)
+        _within("nets.hidden", self.nets.hidden, 1, 8192)
+        _within("nets.embedding", self.nets.embedding, 1, 8192)
+        for name in ("rate", "final_rate", "decay", "epsilon", "cut_share"):
+            _finite(name, getattr(self, name))
+        for owner in ("nets", "global_weights", "chart_weights"):
+            for name, value in asdict(getattr(self, owner)).items():
+                _finite(f"{owner}.{name}", value)
         if self.mode == "global" and not (self.ablation.upper or self.ablation.lower):
             raise InputError("upper and lower are both off, expected at least one branch; switch one on")
 
@@ -146,6 +150,40 @@ def _known(name: str, value: str, choices: tuple[str, ...]) -> None:
         raise InputError(f"{name} is {value!r}, expected one of {', '.join(choices)}; choose one of them")
 
 
-def _at_least(name: str, value: int, least: int) -> None:
-    if value < least:
-        raise InputError(f"{name} is {value}, expected at least {least}; choose another")
+def _within(name: str, value: int, least: int, most: int) -> None:
+    if not least <= value <= most:
+        raise InputError(f"{name} is {value}, expected {least} to {most}; choose another")
+
+
+def _finite(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise InputError(f"{name} is {value}, expected a finite number ≥ 0; choose another")
+
+
+def config_from_json(facts: dict[str, Any]) -> PaperConfig:
+    """The config that ``dataclasses.asdict`` made these facts of; every field must be there, and no other.
+
+    Raises:
+        InputError: a field is missing, unknown, of another type, or out of range.
+    """
+    return _from_json(PaperConfig, facts, "config")
+
+
+def _from_json(kind: type[Any], facts: Any, where: str) -> Any:
+    """A dataclass of this module from plain JSON."""
+    names = {field.name for field in fields(kind)}
+    if not isinstance(facts, dict) or set(facts) != names:
+        found = sorted(map(str, set(facts) ^ names))[:3] if isinstance(facts, dict) else type(facts).__name__
+        raise InputError(f"{where} has missing or unknown fields ({found}); use a file of this version of flexpara")
+    example = kind()
+    values: dict[str, Any] = {}
+    for name in names:
+        default, value = getattr(example, name), facts[name]
+        if is_dataclass(default):
+            values[name] = _from_json(type(default), value, f"{where}.{name}")
+            continue
+        expected = (int, float) if isinstance(default, float) else (type(default),)
+        if not isinstance(value, expected) or isinstance(value, bool) is not isinstance(default, bool):
+            raise InputError(f"{where}.{name} is {str(value)[:80]!r}, expected {type(default).__name__}; correct it")
+        values[name] = type(default)(value)
+    return kind(**values)

@@ -70,7 +70,7 @@ def global_terms(networks: GlobalNetworks, batch: Batch, lattice: Tensor, config
     terms: dict[str, Tensor] = {"cycle": batch.xyz.new_zeros(())}
     if made.uv is not None and made.cycle is not None:
         near = own_neighbours(made.uv, config.neighbours)
-        epsilon = config.epsilon * box_side(made.uv) / len(made.uv) ** 0.5
+        epsilon = config.epsilon * box_side(made.uv) / batch.total**0.5
         terms["unwrap"] = _mean(repulsion(made.uv, near, epsilon).sum(dim=-1))
         terms["cycle"] = terms["cycle"] + _mean(position_gap(made.cycle[:, :3], batch.xyz))
         if batch.normal is not None:

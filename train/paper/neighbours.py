@@ -6,7 +6,7 @@ n, m points · d coordinates · j neighbours.  Indices carry no gradient.
 from __future__ import annotations
 
 import torch
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from ...runtime.errors import FlexparaError
@@ -20,7 +20,7 @@ class Neighbourhood:
 
     def __init__(self, points: Tensor) -> None:
         self._points = _finite(points.detach().float())
-        self._tree = cKDTree(self._points.numpy()) if points.device.type == "cpu" else None
+        self._tree = KDTree(self._points.numpy()) if points.device.type == "cpu" else None
 
     def nearest(self, queries: Tensor, count: int) -> Tensor:
         """Indices (m, count) int64, the nearest first, of the points closest to queries (m, d); count ≤ n.
