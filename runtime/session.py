@@ -54,6 +54,41 @@ class Unwrapped(NamedTuple):
     score: NDArray[np.float32]
 
 
+class Opened(NamedTuple):
+    """A checked file of flexpara.
+
+    zero: what replaced the graph's initializers CENTRES.  onnxruntime reads it from this very memory, so it has to live
+    as long as the session.
+    """
+
+    session: onnxruntime.InferenceSession
+    metadata: BundleMetadata
+    zero: onnxruntime.OrtValue
+
+
+def open_bundle(
+    path: Path,
+    providers: Sequence[str],
+    threads: int | None,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+) -> Opened:
+    """Load a file and check that it is ours and has these inputs and outputs (name → onnxruntime's type).
+
+    Raises: as UnwrapSession.
+    """
+    if threads is not None and threads < 1:
+        raise InputError(f"threads = {threads}, expected at least 1; leave it out for the default")
+    _check_file(path)
+    _check_available(providers)
+    zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
+    session = _load(path, providers, threads, dict.fromkeys(CENTRES, zero))
+    metadata = _read_metadata(session, path)
+    _check_signature(session, path, inputs, outputs)
+    _check_used(session, providers)
+    return Opened(session, metadata, zero)
+
+
 class UnwrapSession:
     """An exported surface map.  Immutable; `unwrap` may be called from several threads at once."""
 
@@ -79,30 +114,18 @@ class UnwrapSession:
             MissingDependencyError: a provider is not in this build of onnxruntime or can't start here.
             InputError: chunk or threads below 1.
         """
-        if chunk < 1 or (threads is not None and threads < 1):
-            raise InputError(
-                f"chunk = {chunk}, threads = {threads}, expected at least 1; leave them out for the defaults"
-            )
-        path = Path(path)
-        _check_file(path)
-        _check_available(providers)
-        # onnxruntime reads replaced initializers from this very memory: it has to live as long as the session.
-        self._zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
-        self._session = _load(path, providers, threads, dict.fromkeys(CENTRES, self._zero))
-        self._metadata = _read_metadata(self._session, path)
-        _check_signature(self._session, path)
-        _check_used(self._session, providers)
-        self._chunk = chunk
+        self._chunk = checked_chunk(chunk)
+        self._opened = open_bundle(Path(path), providers, threads, INPUTS, OUTPUTS)
 
     @property
     def metadata(self) -> BundleMetadata:
         """What the file says about itself: frame, placement, source hash, settings, metrics, producer."""
-        return self._metadata
+        return self._opened.metadata
 
     @property
     def chart_count(self) -> int:
         """Number of charts, k."""
-        return self._metadata.chart_count
+        return self._opened.metadata.chart_count
 
     def unwrap(self, points: Points) -> Unwrapped:
         """Atlas uv, chart and score of points.
@@ -129,7 +152,7 @@ class UnwrapSession:
 
     def _run(self, points: Points, start: int) -> list[NDArray[np.generic]]:
         """Outputs uv, chart, score of one chunk, whose first point is number ``start``."""
-        frame = self._metadata.frame
+        frame = self._opened.metadata.frame
         centred = np.asarray(points, dtype=np.float64) - np.asarray(frame.centre)
         far = np.abs(centred).max(axis=1) > FAR * frame.scale
         if far.any():
@@ -137,8 +160,15 @@ class UnwrapSession:
             found = f"point {start + first} = {points[first].tolist()}"
             expected = f"points near the surface (centre {frame.centre}, radius {frame.scale:.6g})"
             raise InputError(f"{found}, expected {expected}; use the units and the placement of the source file")
-        found = self._session.run(list(OUTPUTS), {"points": centred.astype(np.float32)})
+        found = self._opened.session.run(list(OUTPUTS), {"points": centred.astype(np.float32)})
         return [np.asarray(output) for output in found]
+
+
+def checked_chunk(chunk: int) -> int:
+    """Rows a run.  Raises: InputError below 1."""
+    if chunk < 1:
+        raise InputError(f"chunk = {chunk}, expected at least 1; leave it out for the default")
+    return chunk
 
 
 def _check_file(path: Path) -> None:
@@ -189,11 +219,13 @@ def _read_metadata(session: onnxruntime.InferenceSession, path: Path) -> BundleM
     return BundleMetadata.from_json(properties[METADATA_KEY], str(path))
 
 
-def _check_signature(session: onnxruntime.InferenceSession, path: Path) -> None:
-    inputs = {node.name: node.type for node in session.get_inputs()}
-    outputs = {node.name: node.type for node in session.get_outputs()}
-    if inputs != INPUTS or outputs != OUTPUTS:
-        raise BundleError(f"{path}: {inputs} → {outputs}, expected {INPUTS} → {OUTPUTS}; {_REMEDY}")
+def _check_signature(
+    session: onnxruntime.InferenceSession, path: Path, inputs: Mapping[str, str], outputs: Mapping[str, str]
+) -> None:
+    found_inputs = {node.name: node.type for node in session.get_inputs()}
+    found_outputs = {node.name: node.type for node in session.get_outputs()}
+    if found_inputs != inputs or found_outputs != outputs:
+        raise BundleError(f"{path}: {found_inputs} → {found_outputs}, expected {inputs} → {outputs}; {_REMEDY}")
 
 
 def _check_used(session: onnxruntime.InferenceSession, providers: Sequence[str]) -> None:
