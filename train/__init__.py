@@ -1,4 +1,4 @@
-"""Networks and training: the only folder besides export that imports torch."""
+"""The networks of the paper, their training, and the finishing that makes valid charts of them."""
 
 import os
 
