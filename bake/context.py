@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import InputError, MissingDependencyError
+from ..runtime.errors import MissingDependencyError
 
 try:
     import moderngl
@@ -94,15 +94,6 @@ def max_texture_size(context: moderngl.Context) -> int:
     """Largest side in texels of a texture that can also be drawn into."""
     viewport = context.info["GL_MAX_VIEWPORT_DIMS"]
     return min(int(context.info["GL_MAX_TEXTURE_SIZE"]), *(int(side) for side in viewport))
-
-
-def check_size(context: moderngl.Context, size: int) -> None:
-    """Raise InputError unless a texture of size × size texels can be drawn on this device."""
-    limit = max_texture_size(context)
-    if not 1 <= size <= limit:
-        raise InputError(
-            f"size {size}: this OpenGL device draws 1 to {limit} texels a side; choose a size in that range"
-        )
 
 
 def is_hardware(context: moderngl.Context) -> bool:

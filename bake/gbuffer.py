@@ -1,17 +1,20 @@
 """The surface per texel: an atlas rasterized in uv space once; every map is a function of the result.
 
 h w texels · f faces · n atlas vertices · e border edges.  Image row 0 is the top, uv is v up: the centre of texel
-(row, column) lies at u = (column + ½) / w, v = 1 − (row + ½) / h.  Positions are in source units.
+(row, column) lies at u = (column + ½) / size, v = 1 − (row + ½) / size.  Positions are in source units.
 
 Two draws.  Faces first, each texel whose centre they hold.  Then the borders of charts: each texel whose centre lies
 within `REACH` of a border, evaluated at the nearest point of it.  √½ is half a texel's diagonal, so that is every
 texel a chart touches.
 A texel inside a face is never overwritten; among borders the nearest wins, among equals the first face.
+
+The image is drawn in windows.  Which texel belongs to which face is decided in integers (see shaders/exact.glsl), so
+it depends neither on the device nor on the windows; software.py comes to the same without OpenGL.
 """
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,20 +22,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..runtime.errors import InputError
-from .context import check_size, drawing_into, max_texture_size, moderngl
+from .context import drawing_into, max_texture_size, moderngl
+from .layout import Layout, Planes, Window, check_size, windows
 from .shaders import build_program
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas
 
 REACH = 0.71
 """Texels; a little over √½."""
-UV_SLACK = 1e-4
-"""How far uv may leave [0, 1] (rounding of other tools) before it is an error."""
 CHUNK = 1 << 18
 """Texels interpolated at once: bounds the memory of temporaries."""
+GROWTH = 1.0 / 16.0
+"""Texels by which faces are drawn larger: more than any device's rounding of places.  The fragments decide."""
+WINDOW = 1 << 20
+"""Texels drawn at once: the targets stay in the processor's cache, and their memory is used again."""
+
+
+RECTANGLE = np.array([0, 1, 2, 2, 1, 3], np.int32)
+"""Two triangles of four vertices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +54,7 @@ class GBuffer:
     position: (h, w, 3) float32, source units.  normal: (h, w, 3) float32, unit, interpolated from the atlas' vertex
     normals. second, third: (h, w) float32, barycentric weights of corners 1 and 2 of the face, in [0, 1], sum at most
     1. face: (h, w) int32, −1 where nothing is; there the other arrays are 0.
+    row, column: where this window begins in the image.  size: side of the image in texels, 0 = the height here.
     """
 
     position: NDArray[np.float32]
@@ -49,6 +62,20 @@ class GBuffer:
     second: NDArray[np.float32]
     third: NDArray[np.float32]
     face: NDArray[np.int32]
+    row: int = 0
+    column: int = 0
+    size: int = 0
+
+    @classmethod
+    def of(cls, planes: Planes, row: int = 0, column: int = 0, size: int = 0) -> GBuffer:
+        """Views of the planes."""
+        position, normal, face = planes
+        return cls(position[..., :3], normal[..., :3], position[..., 3], normal[..., 3], face, row, column, size)
+
+    @property
+    def side(self) -> int:
+        """Side of the whole image in texels, of which this may be a window."""
+        return self.size or self.face.shape[0]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -64,6 +91,11 @@ class GBuffer:
     def texels(self) -> NDArray[np.int64]:
         """(t,) int64 flat indices of the texels that hold a surface, ascending."""
         return np.flatnonzero(self.face.reshape(-1) >= 0)
+
+    def image_texels(self, texels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(t,) int64 flat indices in the whole image of flat indices in this window: seeds that no window changes."""
+        row, column = np.divmod(texels, self.shape[1])
+        return (row + self.row) * self.side + column + self.column
 
     def weights(self, texels: NDArray[np.int64]) -> NDArray[np.float32]:
         """(t, 3) float32 barycentric weights of the three corners at flat texel indices."""
@@ -90,36 +122,33 @@ class GBuffer:
         return result
 
 
-def rasterize(context: moderngl.Context, atlas: Atlas, size: int) -> GBuffer:
+def rasterize(context: moderngl.Context, atlas: Atlas, size: int, *, limit: int | None = None) -> GBuffer:
     """Draw the atlas into size × size texels.
 
-    Raises: InputError for a size beyond the device's limit, for uv outside [0, 1], for more faces than the device can
-    hold.
+    limit: the largest side drawn at once, in texels; what the device allows unless given.  It doesn't change a bit.
+    Raises: InputError for a size below 1, for uv outside [0, 1], for more faces than the device can hold.
     """
-    check_size(context, size)
-    check_uv(atlas.uv)
+    check_size(size)
+    planes = Planes.of(size, size)
+    with rasterizer(context, atlas, size, limit=limit) as drawn:
+        for window in drawn.windows:
+            drawn.draw(window, planes.part(window.rows, window.columns))
+    return GBuffer.of(planes, size=size)
+
+
+@contextmanager
+def rasterizer(
+    context: moderngl.Context, atlas: Atlas, size: int, *, limit: int | None = None, texels: int = WINDOW
+) -> Iterator[DeviceRasterizer]:
+    """What draws windows of the atlas at size × size; its objects on the device live as long as the block.
+
+    limit: the largest side of a window.  texels: about how many a window has.  Raises as `rasterize`.
+    """
+    check_size(size)
     check_faces(context, len(atlas.faces))
+    side = min(max_texture_size(context), limit or size)
     with ExitStack() as stack:
-        corners = _corner_texture(context, stack, atlas)
-        targets = _targets(context, stack, size)
-        with drawing_into(context, _cleared_frame(context, stack, targets, size)):
-            context.enable_only(moderngl.DEPTH_TEST)
-            corners.use(0)
-            _draw_interior(context, stack, len(atlas.faces), size)
-            _draw_borders(context, stack, border_edges(atlas.faces, atlas.uv), size)
-            context.enable_only(moderngl.NOTHING)
-        return _read(targets, size)
-
-
-def check_uv(uv: NDArray[np.floating]) -> None:
-    """Raise InputError unless all uv (n, 2) are finite and in [0, 1]."""
-    if not np.isfinite(uv).all():
-        raise InputError("uv holds NaN or infinite values; expected values in [0, 1]; unwrap the mesh anew")
-    low, high = float(uv.min(initial=0.0)), float(uv.max(initial=1.0))
-    if low < -UV_SLACK or high > 1.0 + UV_SLACK:
-        raise InputError(
-            f"uv span {low:.4g} to {high:.4g}; expected 0 to 1 (no UDIM tiles, no repeats); unwrap or repack the mesh"
-        )
+        yield DeviceRasterizer(context, stack, atlas, Layout.of(atlas, size), windows(size, side, texels))
 
 
 def check_faces(context: moderngl.Context, count: int) -> None:
@@ -130,37 +159,94 @@ def check_faces(context: moderngl.Context, count: int) -> None:
         raise InputError(f"{count} faces: this OpenGL device rasterizes 1 to {most}; decimate or split the mesh")
 
 
-def border_edges(faces: NDArray[np.int64], uv: NDArray[np.floating]) -> NDArray[np.int32]:
-    """(e, 2) int32 rows (face, corner): the edge from that corner to the next one has no neighbour beyond it in uv.
+class DeviceRasterizer:
+    """An atlas on an OpenGL device.  `windows` covers the image once; any window no larger can be drawn."""
 
-    A neighbour is the one other face at the edge, running along it the other way, of the same non-zero orientation in
-    uv.
-    So the edges of faces of zero uv area, of folds and of non-manifold fans are borders too.  Rows ascend.
-    """
-    corner = uv[faces].astype(np.float64)
-    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    sign = np.sign(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).astype(np.int64)
-    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    key = np.minimum(start, end) * (int(faces.max()) + 1) + np.maximum(start, end)
-    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
-    edge = edge.reshape(-1)
-    direction = np.bincount(edge, weights=np.sign(end - start))
-    orientation = np.bincount(edge, weights=np.repeat(sign, 3))
-    joined = (count == 2) & (direction == 0.0) & (np.abs(orientation) == 2.0)
-    half_edges = np.flatnonzero(~joined[edge])
-    return np.stack([half_edges // 3, half_edges % 3], axis=1).astype(np.int32)
+    def __init__(
+        self, context: moderngl.Context, stack: ExitStack, atlas: Atlas, layout: Layout, windows: list[Window]
+    ) -> None:
+        """All objects are released by the stack."""
+        self.layout, self.windows = layout, windows
+        self._context = context
+        self._width, self._height = max(w.width for w in windows), max(w.height for w in windows)
+        self._corners = _corner_texture(context, stack, atlas, layout)
+        self._targets = _targets(context, stack, self._width, self._height)
+        self._nothing = np.full((self._height, self._width), -1, np.int32)
+        self._interior = _program(context, stack, "interior")
+        self._border = _program(context, stack, "border")
+        self._interior["growth"] = GROWTH
+        self._border["reach"] = REACH
+
+    def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
+        """The G-buffer of a window, read into planes of its shape where given: they are then used, not copied.
+
+        Raises: InputError for a window larger than the largest of `windows`.
+        """
+        if window.height > self._height or window.width > self._width:
+            raise InputError(
+                f"window of {window.height} × {window.width} texels: expected at most {self._height} × {self._width}"
+            )
+        into = Planes.of(window.height, window.width) if planes is None else planes
+        with ExitStack() as stack:
+            frame = _cleared_frame(self._context, stack, self._targets, self._nothing)
+            with drawing_into(self._context, frame):
+                frame.viewport = (0, 0, window.width, window.height)
+                self._context.enable_only(moderngl.DEPTH_TEST)
+                self._corners.use(0)
+                self._draw_faces(stack, window)
+                self._draw_borders(stack, window)
+                self._context.enable_only(moderngl.NOTHING)
+                for attachment, plane in enumerate(into):
+                    _read(frame, attachment, plane)
+        return GBuffer.of(into, window.row, window.column, self.layout.size)
+
+    def _draw_faces(self, stack: ExitStack, window: Window) -> None:
+        """A triangle for each face; two, a rectangle, for needles, whose numbers go down as ~face."""
+        faces = self.layout.faces_in(window)
+        needle = self.layout.radius[faces] < GROWTH
+        order = 4 * np.arange(len(faces), dtype=np.int32)[:, None] + RECTANGLE
+        drawn = np.repeat(needle[:, None], 6, axis=1)
+        drawn[:, :3] = True
+        self._render(stack, self._interior, "in_face", np.where(needle, ~faces, faces)[:, None], order[drawn], window)
+
+    def _draw_borders(self, stack: ExitStack, window: Window) -> None:
+        """A rectangle for each border edge."""
+        edges = self.layout.edges_in(window, REACH)
+        order = 4 * np.arange(len(edges), dtype=np.int32)[:, None] + RECTANGLE
+        self._render(stack, self._border, "in_edge", edges, order.reshape(-1), window)
+
+    def _render(
+        self,
+        stack: ExitStack,
+        program: moderngl.Program,
+        name: str,
+        items: NDArray[np.int32],
+        order: NDArray[np.int32],
+        window: Window,
+    ) -> None:
+        """Triangles between vertices, four for each row of items (i, c), taken three by three in that order."""
+        if len(items) == 0:
+            return
+        program["origin"] = (window.column, window.row)
+        program["window"] = (window.width, window.height)
+        vertices = self._context.buffer(np.repeat(items, 4, axis=0))
+        stack.callback(vertices.release)
+        indices = self._context.buffer(order)
+        stack.callback(indices.release)
+        array = self._context.vertex_array(program, [(vertices, f"{items.shape[1]}i4", name)], index_buffer=indices)
+        stack.callback(array.release)
+        array.render(moderngl.TRIANGLES)
 
 
-def _corner_texture(context: moderngl.Context, stack: ExitStack, atlas: Atlas) -> moderngl.Texture:
+def _corner_texture(context: moderngl.Context, stack: ExitStack, atlas: Atlas, layout: Layout) -> moderngl.Texture:
     """RGBA32F texture of all corners in the order that triangle.glsl reads."""
     faces = atlas.faces
     per_row = max_texture_size(context) // 6
     rows = -(-len(faces) // per_row)
     data = np.zeros((rows * per_row if rows > 1 else len(faces), 3, 2, 4), np.float32)
     data[: len(faces), :, 0, :3] = atlas.positions[faces]
-    data[: len(faces), :, 0, 3] = atlas.uv[faces][..., 0]
     data[: len(faces), :, 1, :3] = atlas.normals[faces]
-    data[: len(faces), :, 1, 3] = atlas.uv[faces][..., 1]
+    data[: len(faces), :, :, 3] = layout.texel
     width = 6 * (len(data) // rows)
     texture = context.texture((width, rows), 4, data, dtype="f4")
     stack.callback(texture.release)
@@ -168,62 +254,44 @@ def _corner_texture(context: moderngl.Context, stack: ExitStack, atlas: Atlas) -
     return texture
 
 
-def _targets(context: moderngl.Context, stack: ExitStack, size: int) -> list[moderngl.Texture]:
-    """Textures for position, normal and face.  Face starts as −1 by upload: moderngl clears to floats only."""
-    nothing = np.full((size, size), -1, np.int32)
-    targets = [
-        context.texture((size, size), 4, dtype="f4"),
-        context.texture((size, size), 4, dtype="f4"),
-        context.texture((size, size), 1, nothing, dtype="i4"),
-    ]
+def _targets(context: moderngl.Context, stack: ExitStack, width: int, height: int) -> list[moderngl.Texture]:
+    """Textures for position, normal and face, then depth."""
+    size = (width, height)
+    targets = [context.texture(size, count, dtype=kind) for count, kind in ((4, "f4"), (4, "f4"), (1, "i4"))]
+    targets.append(context.depth_texture(size))
     for target in targets:
         stack.callback(target.release)
     return targets
 
 
 def _cleared_frame(
-    context: moderngl.Context, stack: ExitStack, targets: list[moderngl.Texture], size: int
+    context: moderngl.Context, stack: ExitStack, targets: list[moderngl.Texture], nothing: NDArray[np.int32]
 ) -> moderngl.Framebuffer:
-    """Framebuffer over all targets: floats 0, depth at its far end.  The caller releases it."""
-    depth = context.depth_renderbuffer((size, size))
-    stack.callback(depth.release)
-    floats = context.framebuffer(color_attachments=targets[:2], depth_attachment=depth)
+    """Framebuffer over all targets: floats 0, depth at its far end, face −1.  The caller releases it.
+
+    Face is reset by upload: moderngl clears to floats only.
+    """
+    floats = context.framebuffer(color_attachments=targets[:2], depth_attachment=targets[3])
     with drawing_into(context, floats):
         floats.clear(depth=1.0)
-    return context.framebuffer(color_attachments=targets, depth_attachment=depth)
+    targets[2].write(nothing)
+    return context.framebuffer(color_attachments=targets[:3], depth_attachment=targets[3])
 
 
-def _draw_interior(context: moderngl.Context, stack: ExitStack, faces: int, size: int) -> None:
-    """First draw: all faces, no attributes."""
-    program = build_program(context, ("triangle", "interior.vert"), ("surface", "interior.frag"))
+def _program(context: moderngl.Context, stack: ExitStack, name: str) -> moderngl.Program:
+    """The program of interior or border."""
+    vertex, fragment = ("exact", "triangle", f"{name}.vert"), ("exact", "surface", f"{name}.frag")
+    program = build_program(context, vertex, fragment)
     stack.callback(program.release)
-    program["size"] = float(size)
     program["corners"] = 0
-    array = context.vertex_array(program, [])
-    stack.callback(array.release)
-    array.render(moderngl.TRIANGLES, vertices=3 * faces)
+    return program
 
 
-def _draw_borders(context: moderngl.Context, stack: ExitStack, edges: NDArray[np.int32], size: int) -> None:
-    """Second draw: a rectangle around every border edge."""
-    if len(edges) == 0:
-        return
-    program = build_program(context, ("triangle", "border.vert"), ("surface", "border.frag"))
-    stack.callback(program.release)
-    program["size"] = float(size)
-    program["corners"] = 0
-    program["reach"] = REACH
-    buffer = context.buffer(np.repeat(edges, 6, axis=0))
-    stack.callback(buffer.release)
-    array = context.vertex_array(program, [(buffer, "2i4", "in_edge")])
-    stack.callback(array.release)
-    array.render(moderngl.TRIANGLES, vertices=6 * len(edges))
-
-
-def _read(targets: list[moderngl.Texture], size: int) -> GBuffer:
-    """Targets → arrays, as views: barycentric weights travel in the fourth channels."""
-    position, normal = np.zeros((size, size, 4), np.float32), np.zeros((size, size, 4), np.float32)
-    face = np.zeros((size, size), np.int32)
-    for target, array in zip(targets, (position, normal, face), strict=True):
-        target.read_into(array)
-    return GBuffer(position[..., :3], normal[..., :3], position[..., 3], normal[..., 3], face)
+def _read(frame: moderngl.Framebuffer, attachment: int, plane: NDArray[np.generic]) -> None:
+    """One attachment into a plane, by way of a new array where the plane's texels do not lie together."""
+    components, kind = (plane.shape[2], "f4") if plane.ndim == 3 else (1, "i4")
+    into = plane if plane.flags.c_contiguous else np.zeros_like(plane, order="C")
+    viewport = (0, 0, plane.shape[1], plane.shape[0])
+    frame.read_into(into, viewport=viewport, components=components, attachment=attachment, dtype=kind)
+    if into is not plane:
+        plane[...] = into

@@ -1,5 +1,6 @@
-// Texels near the border of a chart: a rectangle around each border edge, wider than the edge by `reach` texels all round.
-// Two triangles, six vertices an edge.  The face is turned so that the edge runs from its corner 0 to its corner 1.
+// Texels near the border of a chart: a rectangle around each border edge, wider than its reach by a texel all round, so
+// that the fragments decide.  Four vertices an edge.  The face is turned so that the edge runs from its corner 0 to its
+// corner 1.
 
 in ivec2 in_edge;  // face, corner at which the edge starts
 
@@ -11,8 +12,6 @@ flat out vec2 texel0, texel1, texel2;
 flat out int face;
 flat out int turn;
 
-const vec2 RECTANGLE[6] = vec2[](vec2(0, -1), vec2(1, -1), vec2(1, 1), vec2(0, -1), vec2(1, 1), vec2(0, 1));
-
 void main() {
     face = in_edge.x;
     turn = in_edge.y;
@@ -22,8 +21,8 @@ void main() {
     normal0 = triangle.normal[a]; normal1 = triangle.normal[b]; normal2 = triangle.normal[c];
     texel0 = triangle.texel[a]; texel1 = triangle.texel[b]; texel2 = triangle.texel[c];
     vec2 along = texel1 - texel0;
-    along = dot(along, along) > 0.0 ? normalize(along) : vec2(1.0, 0.0);
-    vec2 place = RECTANGLE[gl_VertexID % 6];
-    vec2 end = place.x > 0.5 ? texel1 + reach * along : texel0 - reach * along;
-    gl_Position = clip_position(end + place.y * reach * vec2(-along.y, along.x));
+    along = (reach + 1.0) * (dot(along, along) > 0.0 ? normalize(along) : vec2(1.0, 0.0));
+    int corner = gl_VertexID & 3;
+    vec2 end = (corner & 1) == 0 ? texel0 - along : texel1 + along;
+    gl_Position = clip_position(end + ((corner & 2) == 0 ? -1.0 : 1.0) * vec2(-along.y, along.x));
 }

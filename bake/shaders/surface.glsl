@@ -5,9 +5,16 @@ flat in vec3 normal0, normal1, normal2;
 flat in vec2 texel0, texel1, texel2;
 flat in int face;
 
+uniform ivec2 origin;
+
 layout(location = 0) out vec4 out_position;  // xyz, second barycentric coordinate
 layout(location = 1) out vec4 out_normal;    // xyz unit, third barycentric coordinate
 layout(location = 2) out int out_face;
+
+// The texel of the whole image that this fragment is.
+ivec2 image_texel() {
+    return ivec2(gl_FragCoord.xy) + origin;
+}
 
 vec3 weighted_normal(vec3 weight) {
     vec3 normal = weight.x * normal0 + weight.y * normal1 + weight.z * normal2;

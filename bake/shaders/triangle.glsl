@@ -1,8 +1,9 @@
 // One surface triangle as the rasterizing shaders see it, fetched by face number from the texture `corners`.
 //
 // corners: RGBA32F, two texels a corner, three corners a face, faces in reading order:
-//          (position.xyz, u) and (normal.xyz, v).
-// Texel coordinates: x = u size, y = (1 - v) size, so that row 0 of the target is the top of the image.
+//          (position.xyz, x) and (normal.xyz, y), where x and y are the corner's place in the image, in texels,
+//          y down, so that row 0 of the target is the top of the image.
+// A draw fills one window of the image: texels origin to origin + window.
 
 struct Triangle {
     vec3 position[3];
@@ -11,7 +12,8 @@ struct Triangle {
 };
 
 uniform sampler2D corners;
-uniform float size;
+uniform ivec2 origin;
+uniform ivec2 window;
 
 vec4 corner_texel(int index) {
     int width = textureSize(corners, 0).x;
@@ -25,11 +27,11 @@ Triangle fetch_triangle(int face) {
         vec4 second = corner_texel(6 * face + 2 * i + 1);
         triangle.position[i] = first.xyz;
         triangle.normal[i] = second.xyz;
-        triangle.texel[i] = vec2(first.w, 1.0 - second.w) * size;
+        triangle.texel[i] = vec2(first.w, second.w);
     }
     return triangle;
 }
 
 vec4 clip_position(vec2 texel) {
-    return vec4(texel / size * 2.0 - 1.0, 0.0, 1.0);
+    return vec4((texel - vec2(origin)) / vec2(window) * 2.0 - 1.0, -1.0, 1.0);
 }

@@ -98,7 +98,7 @@ def test_a_function_of_the_wrong_shape_is_named(quad: Pair) -> None:
         bake(*quad, [custom(np.zeros((3, 3, 1)))])
 
 
-@pytest.mark.parametrize(("size", "text"), [(0, "size 0"), (10**6, "size 1000000: this OpenGL")])
+@pytest.mark.parametrize(("size", "text"), [(0, "size 0"), (10**6, "size 1000000: expected 1 to")])
 def test_a_size_that_cannot_be_drawn_is_refused(quad: Pair, size: int, text: str) -> None:
     with pytest.raises(InputError, match=text):
         bake(*quad, ["position"], size=size)

@@ -9,7 +9,7 @@ import moderngl
 import pytest
 
 from flexpara.bake import context as module
-from flexpara.runtime.errors import InputError, MissingDependencyError
+from flexpara.runtime.errors import MissingDependencyError
 
 
 class FakeContext:
@@ -82,14 +82,6 @@ def test_a_context_is_released_when_its_block_fails(monkeypatch: pytest.MonkeyPa
     with pytest.raises(KeyboardInterrupt), module.open_context():
         raise KeyboardInterrupt
     assert only.released
-
-
-def test_a_size_beyond_the_limit_names_the_limit(context: moderngl.Context) -> None:
-    limit = module.max_texture_size(context)
-    module.check_size(context, limit)
-    for size in (0, -5, limit + 1):
-        with pytest.raises(InputError, match=f"{size}.*1 to {limit}"):
-            module.check_size(context, size)
 
 
 def test_a_leak_would_be_seen(leaks: Callable[[moderngl.Context], list[str]]) -> None:

@@ -9,7 +9,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from flexpara.bake.gbuffer import CHUNK, REACH, border_edges, rasterize
+from flexpara.bake.gbuffer import CHUNK, REACH, rasterize, rasterizer
+from flexpara.bake.layout import Planes, border_edges, windows
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas
 
@@ -48,6 +49,29 @@ def test_a_quad_whose_position_is_its_uv_holds_the_texel_centres(
     assert np.abs(buffer.position[..., 0] - u).max() < 1e-5
     assert np.abs(buffer.position[..., 1] - v[:, None]).max() < 1e-5
     np.testing.assert_array_equal(buffer.normal, np.broadcast_to([0, 0, 1], (size, size, 3)))
+
+
+@pytest.mark.parametrize("limit", [7, 16, 33, 100])
+def test_tiles_change_no_bit(sphere: Pair, quad: Pair, context: moderngl.Context, limit: int) -> None:
+    for atlas, _ in (sphere, quad):
+        whole, tiled = rasterize(context, atlas, 100), rasterize(context, atlas, 100, limit=limit)
+        for name in ("position", "normal", "second", "third", "face"):
+            assert getattr(whole, name).tobytes() == getattr(tiled, name).tobytes()
+
+
+def test_a_window_drawn_again_into_kept_planes_is_the_same(sphere: Pair, context: moderngl.Context) -> None:
+    whole = rasterize(context, sphere[0], 50)
+    with rasterizer(context, sphere[0], 50, limit=20) as drawn:
+        planes = Planes.of(20, 20)
+        for window in drawn.windows:
+            part = planes.part(slice(window.height), slice(window.width))
+            buffer = drawn.draw(window, part)
+            assert buffer.face.base is not None
+            np.testing.assert_array_equal(buffer.position, whole.position[window.rows, window.columns])
+            np.testing.assert_array_equal(buffer.face, whole.face[window.rows, window.columns])
+            assert (buffer.image_texels(np.array([0])) == window.row * 50 + window.column).all()
+        with pytest.raises(InputError, match="window of 21"):
+            drawn.draw(windows(21, 21, 1000)[0])
 
 
 def test_row_0_is_the_top(quad: Pair, context: moderngl.Context) -> None:
