@@ -57,8 +57,8 @@ def row_of(job: Job, asset: Asset, outcome: Outcome) -> Row:
     return row | {"metrics": metrics, "seconds": seconds, "raw": raw, "report": report}
 
 
-def rows_of(asset: Asset, arguments: argparse.Namespace) -> Iterator[Row]:
-    """A row for each mode and system that was asked for, as soon as it is measured; flexpara before slim."""
+def outcomes_of(asset: Asset, arguments: argparse.Namespace) -> Iterator[tuple[Job, Outcome]]:
+    """Each job that was asked for, by mode and system, as soon as it has ended; flexpara before slim."""
     asked = [name for name in NAMES if name in arguments.systems]
     order = asked if "slim" not in asked or "flexpara" in asked else ["flexpara", *asked]
     for mode in arguments.modes:
@@ -71,7 +71,7 @@ def rows_of(asset: Asset, arguments: argparse.Namespace) -> Iterator[Row]:
             if name == "flexpara" and outcome.answer is not None:
                 seams = outcome.answer.corner_uv
             if name in asked:
-                yield row_of(job, asset, outcome)
+                yield job, outcome
 
 
 def with_ratios(rows: list[Row]) -> list[Row]:
@@ -192,8 +192,9 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parse(argv)
     facts, rows = about(arguments), list[Row]()
     for path in arguments.files:
-        for row in rows_of(load_asset(path), arguments):
-            rows.append(row)
+        asset = load_asset(path)
+        for job, outcome in outcomes_of(asset, arguments):
+            rows.append(row := row_of(job, asset, outcome))
             ended = f"{row['seconds']:.1f} s" if row["status"] == "done" else f"{row['status']}: {row['why']}"
             print(f"{row['mesh']} · {row['mode']} · {row['system']} · {ended}", file=sys.stderr, flush=True)
             if arguments.json:

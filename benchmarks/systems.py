@@ -117,17 +117,34 @@ def by_slim(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -> An
         raise MissingDependencyError(f'{error}; pip install "flexpara[train]"') from error
     chart, cut = uv_charts(surface.faces, seams)
     faces, source = split_non_manifold_vertices(surface.faces, cut)
-    corner_uv, left = np.zeros((len(faces), 3, 2)), 0.0
+    corner_uv, boxes = np.zeros((len(faces), 3, 2)), np.zeros((int(chart.max()) + 1, 2))
     start = time.perf_counter()
-    for number in range(int(chart.max()) + 1):
+    for number in range(len(boxes)):
         used, local = np.unique(faces[chart == number], return_inverse=True)
         local = local.reshape(-1, 3)
         uv = flatten(Surface(surface.vertices[source[used]], local), SLIM_ITERATIONS)
-        width, height = np.ptp(uv, axis=0)
-        corner_uv[chart == number] = (uv - uv.min(axis=0) + (left, 0.0))[local]
-        left += width + 0.01 * max(width, height)
+        corner_uv[chart == number] = (uv - uv.min(axis=0))[local]
+        boxes[number] = np.ptp(uv, axis=0)
     seconds = time.perf_counter() - start
-    return Answer(corner_uv, seconds, {"charts": int(chart.max()) + 1, "iterations": SLIM_ITERATIONS})
+    corner_uv += on_shelves(boxes)[chart][:, None]
+    return Answer(corner_uv, seconds, {"charts": len(boxes), "iterations": SLIM_ITERATIONS})
+
+
+def on_shelves(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lower left corners (k, 2) of boxes (k, 2) that lie apart from each other: rows from tall to low, about a square.
+
+    Slim only flattens: this places its charts so that none overlap, no more.
+    """
+    gap = 0.02 * float(boxes.max())
+    width = max(1.1 * float(np.sqrt(np.prod(boxes + gap, axis=1).sum())), float(boxes[:, 0].max()))
+    corner, left, bottom, height = np.zeros_like(boxes), 0.0, 0.0, 0.0
+    for number in np.argsort(-boxes[:, 1]).tolist():
+        wide, tall = boxes[number].tolist()
+        if left > 0.0 and left + wide > width:
+            left, bottom, height = 0.0, bottom + height + gap, 0.0
+        corner[number] = left, bottom
+        left, height = left + wide + gap, max(height, tall)
+    return corner
 
 
 def by_peer(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -> Answer:

@@ -52,7 +52,8 @@ def rows_with(run: FakeRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, *mo
     """Rows of a tetrahedron by the name of bunny."""
     monkeypatch.setattr(paper, "run", run)
     asset = asset_from_arrays(*TETRAHEDRON, stem="bunny")
-    return paper.with_ratios(list(paper.rows_of(asset, arguments_for(tmp_path, *more))))
+    ended = list(paper.outcomes_of(asset, arguments_for(tmp_path, *more)))
+    return paper.with_ratios([paper.row_of(job, asset, outcome) for job, outcome in ended])
 
 
 def test_slim_gets_the_seams_of_flexpara_of_the_same_mode(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

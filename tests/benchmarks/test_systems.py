@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks import systems
-from benchmarks.systems import Answer, Job, by_flexpara, in_time, run
+from benchmarks.systems import Answer, Job, by_flexpara, in_time, on_shelves, run
 from flexpara.runtime.errors import FinishError, FlexparaError, InputError, MissingFileError
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.metrics import measure
@@ -58,6 +58,18 @@ def test_slim_keeps_the_seams_and_flattens_what_is_developable(tmp_path: Path) -
     assert (after.flipped_faces, after.overlap_fraction) == (0, 0.0)
     assert after.symmetric_dirichlet_mean < 1.001
     assert after.conformal_mean < 0.02
+
+
+def test_boxes_on_shelves_lie_apart_in_about_a_square() -> None:
+    size = np.random.default_rng(0).uniform(0.1, 1.0, (40, 2))
+    low = on_shelves(size)
+    high = low + size
+    apart = (low[:, None] >= high[None]) | (high[:, None] <= low[None])
+    assert (apart.any(axis=2) | np.eye(40, dtype=bool)).all()
+    width, height = high.max(axis=0) - low.min(axis=0)
+    assert 0.6 < width / height < 1.7
+    assert size.prod(axis=1).sum() > 0.6 * width * height
+    np.testing.assert_array_equal(on_shelves(np.array([[2.0, 1.0]])), [[0.0, 0.0]])
 
 
 def test_slim_without_seams_is_not_run(tmp_path: Path) -> None:
