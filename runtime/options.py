@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from .mesh import Asset
 
 SIZES = (16, 16384)
-PRESETS = ("fast",)
+PRESETS = ("fast", "paper")
+MODES = ("multi-chart", "global")
+PRECISIONS = ("float32", "bfloat16")
+ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirectional", "chart-differential")
+"""The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "obj", "ply")
 LARGEST_SEED = 2**32 - 1
 AUTO = "auto"
@@ -23,7 +27,11 @@ class Options:
 
     charts: K ≥ 1, the most charts a connected surface may get.  size: atlas side, 16 to 16384 texels.
     padding: texels kept free around each chart, 0 to size / 8; None is size / 256, at least 2.
-    seed: 0 to 2³² − 1.  preset: "fast".
+    seed: 0 to 2³² − 1.
+    preset: "fast" is seconds on a CPU; "paper" trains as published, which wants a GPU.
+    What follows is for preset "paper" alone.  mode: "global" (one chart) or "multi-chart".  steps: optimizer steps,
+    None as published (10,000).  width: channels of hidden layers, None as published (512).  precision: "float32" or
+    "bfloat16".  ablation: names out of ABLATIONS.
 
     Raises: InputError for a value outside these.
     """
@@ -33,6 +41,11 @@ class Options:
     padding: int | None = None
     seed: int = 0
     preset: str = "fast"
+    mode: str = "multi-chart"
+    steps: int | None = None
+    width: int | None = None
+    precision: str = "float32"
+    ablation: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         (low, high), most, presets = SIZES, self.size // 8, ", ".join(PRESETS)
@@ -41,6 +54,24 @@ class Options:
         _demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
         _demand(0 <= self.seed <= LARGEST_SEED, f"seed is {self.seed}, expected 0 to {LARGEST_SEED}; pass --seed 0")
         _demand(self.preset in PRESETS, f"preset is {self.preset!r}, expected one of {presets}; leave --preset out")
+        self._check_paper()
+
+    def _check_paper(self) -> None:
+        """What preset "paper" alone can be asked."""
+        for name, known in (("mode", MODES), ("precision", PRECISIONS)):
+            value = getattr(self, name)
+            _demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
+        for name in self.ablation:
+            _demand(name in ABLATIONS, f"ablation is {name!r}, expected some of {', '.join(ABLATIONS)}; correct it")
+        for name in ("steps", "width"):
+            value = getattr(self, name)
+            _demand(value is None or value >= 1, f"{name} is {value}, expected 1 or more; leave --{name} out")
+        for name in ("mode", "steps", "width", "precision", "ablation"):
+            value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
+            _demand(
+                self.preset == "paper" or value == default,
+                f"{name} is {value!r}, which preset {self.preset} doesn't have; add --preset paper, or leave it out",
+            )
 
     @property
     def margin(self) -> int:

@@ -35,10 +35,18 @@ def test_padding_follows_the_size_unless_given(size: int, margin: int) -> None:
         ({"seed": -1}, {"seed": 0}),
         ({"seed": 2**32}, {"seed": 2**32 - 1}),
         ({"preset": "slow"}, {"preset": "fast"}),
+        ({"mode": "both", "preset": "paper"}, {"mode": "global", "preset": "paper"}),
+        ({"mode": "global"}, {"mode": "multi-chart"}),
+        ({"steps": 0, "preset": "paper"}, {"steps": 1, "preset": "paper"}),
+        ({"steps": 5}, {"steps": None}),
+        ({"width": 0, "preset": "paper"}, {"width": 1, "preset": "paper"}),
+        ({"precision": "int8", "preset": "paper"}, {"precision": "bfloat16", "preset": "paper"}),
+        ({"ablation": ("upper",), "preset": "paper"}, {"ablation": ("no-upper",), "preset": "paper"}),
+        ({"ablation": ("no-upper",)}, {"ablation": ()}),
     ],
 )
 def test_each_bound_is_exact_and_named(wrong: dict[str, Any], right: dict[str, Any]) -> None:
-    (name,) = wrong
+    name = next(iter(wrong))
     with pytest.raises(InputError, match=f"{name} is .*expected .*;"):
         Options(**wrong)
     Options(**right)
