@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -112,9 +113,16 @@ def about(arguments: argparse.Namespace) -> Row:
     return facts | {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "device": device,
+        "conditions": conditions(),
         "versions": facts["versions"] | versions,
         "settings": {name: getattr(arguments, name) for name in names},
     }
+
+
+def conditions() -> str:
+    """What else decides how long things take: threads, priority, and how busy the machine was at the start."""
+    threads = os.environ.get("OMP_NUM_THREADS", "as many as cores")
+    return f"OMP_NUM_THREADS {threads}, niceness {os.nice(0)}, load average {os.getloadavg()[0]:.1f} at the start"
 
 
 def words(text: str, known: tuple[str, ...]) -> tuple[str, ...]:

@@ -95,6 +95,7 @@ def heading(facts: Row) -> str:
     packages = ", ".join(f"{name} {number}" for name, number in facts["versions"].items())
     settings = ", ".join(f"{name} {plain(value)}" for name, value in facts["settings"].items() if value is not None)
     where = f"{facts['date']} · {facts['cpu']}, {facts['cores']} cores · torch on {facts['device']}"
+    where += f" · {facts['conditions']}"
     return f"{where} · Python {facts['python']} · {packages} · commit {facts['commit']}\n\nSettings: {settings}."
 
 
