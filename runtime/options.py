@@ -70,7 +70,7 @@ class Options:
             value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
             _demand(
                 self.preset == "paper" or value == default,
-                f"{name} is {value!r}, which preset {self.preset} doesn't have; add --preset paper, or leave it out",
+                f"{name} is {value!r}, expected {default!r} with preset {self.preset}; add --preset paper, or leave it out",
             )
 
     @property
