@@ -54,7 +54,8 @@ def row_of(job: Job, asset: Asset, outcome: Outcome) -> Row:
         metrics = measure(asset.surface, corner_uv).to_dict()
     except FlexparaError as error:
         return row | {"status": "failed", "why": f"its uv can't be measured: {error}"}
-    raw = report.get("train", {}).get("paper") if job.system == "flexpara" else None
+    paper = report.get("train", {}).get("paper") or {}
+    raw = paper.get("raw", paper) or None
     return row | {"metrics": metrics, "seconds": seconds, "raw": raw, "report": report}
 
 

@@ -77,7 +77,9 @@ PAPER_NAMES = {
     "ours": "FlexPara", "optcuts": "OptCuts", "slim": "SLIM, seams by hand", "nuvo": "Nuvo", "xatlas": "xatlas",
     "smart-uv": "Smart UV", "fbcp-pc": "FBCP-PC",
 }  # fmt: skip
-RAW_NAMES = {name: (name, quantity.metric) for name, quantity in QUANTITIES.items()}
+RAW_NAMES = {
+    name: (name, quantity.metric, quantity.metric.removesuffix("_mean")) for name, quantity in QUANTITIES.items()
+}
 
 
 def markdown(facts: Row, rows: list[Row]) -> str:

@@ -121,6 +121,14 @@ def test_raw_figures_have_a_line_of_their_own(monkeypatch: pytest.MonkeyPatch, t
     assert any("finished atlas" in line for line in lines)
 
 
+def test_raw_figures_may_lie_one_deeper() -> None:
+    inside = Outcome("done", "", Answer(APART, 1.0, {"train": {"paper": {"raw": RAW, "cut_points": 0.1}}}))
+    asset = asset_from_arrays(*TETRAHEDRON)
+    assert paper.row_of(Job("flexpara"), asset, inside)["raw"] == RAW
+    bare = Outcome("done", "", Answer(APART, 1.0, {"train": {}}))
+    assert paper.row_of(Job("flexpara"), asset, bare)["raw"] is None
+
+
 def test_the_lines_of_a_table_have_one_number_of_cells(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     rows = rows_with(FakeRun(slim="failed"), monkeypatch, tmp_path)
     rows += [row | {"mesh": "unheard-of"} for row in rows]

@@ -93,6 +93,12 @@ def test_a_models_figures_leave_ablations_out() -> None:
     assert {item.mode for item in figures_of(load_figures(), "bird", "multi-chart")} == {"multi-chart"}
 
 
+@pytest.mark.parametrize(("model", "count"), [("bunny", 24), ("beetle-alt", 8), ("rocker-arm", 8), ("homer", 0)])
+def test_the_figures_of_the_models_at_hand_are_found(model: str, count: int) -> None:
+    figures = load_figures()
+    assert len(figures_of(figures, model, "global") + figures_of(figures, model, "multi-chart")) == count
+
+
 def test_a_figure_is_measured_by_a_run_of_the_same_model_mode_and_system() -> None:
     assert why_not_run(figure(), [ran()]) == ""
     assert why_not_run(figure(), [ran(mesh="cow")]) == "no mesh of that name was given"
