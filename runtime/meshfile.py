@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .cleaning import clean
+from .cloudfile import is_cloud
 from .errors import MeshError, MissingFileError, ShapeError
 from .gltffile import read_gltf
 from .materials import read_in_folder
@@ -49,6 +50,11 @@ def load_asset(path: Path) -> Asset:
         raise MissingFileError(f"{path} does not exist, expected a mesh file; check the path")
     if path.stat().st_size > MAX_BYTES:
         raise MeshError(f"{path} has {path.stat().st_size} bytes, at most {MAX_BYTES} are read; decimate the mesh")
+    if is_cloud(path):
+        raise MeshError(
+            f"{path} holds points and no faces, expected triangles; flexpara unwrap takes point clouds, "
+            "for all else give a triangle mesh"
+        )
     data = path.read_bytes()
     try:
         return clean(_read(data, path), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())

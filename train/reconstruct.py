@@ -87,7 +87,7 @@ def reconstruct(cloud: PointCloud, config: CloudConfig | None = None) -> CloudMe
     shown = local.normals[used]
     if distinct.normals is not None and not local.reoriented:
         own = distinct.normals[local.chosen[used]]
-        shown = np.where(own.any(axis=1)[:, None], own, shown)
+        shown = np.where(np.linalg.norm(own, axis=1, keepdims=True) > 0.0, own, shown)
     asset = Asset(
         positions=surface.vertices,
         faces=surface.faces,
@@ -109,7 +109,7 @@ def _local(distinct: DistinctPoints, config: CloudConfig) -> _Local:
         points = distinct.points[chosen]
         index, distance = nearest_neighbours(points, config.neighbours)
         spacing = local_spacing(distance)
-        apart = (distance[:, 0] >= config.closest * spacing) | (index[:, 0] > np.arange(len(chosen)))
+        apart: NDArray[np.bool_] = (distance[:, 0] >= config.closest * spacing) | (index[:, 0] > np.arange(len(chosen)))
         if apart.all():
             break
         chosen = chosen[np.flatnonzero(apart)]

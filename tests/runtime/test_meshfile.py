@@ -106,13 +106,13 @@ def test_face_colours_are_dropped_and_counted(tmp_path: Path) -> None:
         ("a.ply", b"nothing", "not readable"),
         ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\n", "a.ply"),
         ("a.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n", "a.off"),
-        ("a.txt", b"hello", r"extension '\.txt'"),
+        ("a.md", b"hello", r"extension '\.md'"),
         ("a", b"hello", "extension ''"),
         ("a.json", b"{}", "no mesh format"),
         ("a.zip", b"PK", "no mesh format"),
         ("a.svg", b"<svg/>", "no mesh format"),
         ("a.dxf", b"", "no mesh format"),
-        ("a.xyz", b"0 0 0\n1 1 1\n", "no mesh format"),
+        ("a.xyz", b"0 0 0\n1 1 1\n", "points and no faces"),
         ("a.glb", b"glTF", "damaged"),
     ],
 )
@@ -126,7 +126,7 @@ def test_what_is_no_mesh_says_so_in_one_line(tmp_path: Path, name: str, content:
 
 def test_a_point_cloud_is_told_apart_from_damage(tmp_path: Path) -> None:
     trimesh.PointCloud(np.random.default_rng(0).random((5, 3))).export(tmp_path / "a.ply")
-    with pytest.raises(MeshError, match="point clouds come in a later version"):
+    with pytest.raises(MeshError, match=r"points and no faces.* flexpara unwrap takes point clouds"):
         load_asset(tmp_path / "a.ply")
 
 
