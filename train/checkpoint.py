@@ -137,7 +137,16 @@ def resume(folder: Path) -> Resumed:
     if not DIGEST.fullmatch(sha):
         raise InputError(f"{manifest}: input_sha256 is {sha[:80]!r}, expected 64 hex digits; use another checkpoint")
     tensors = _read_tensors(folder, _checked(manifest, facts, "tensors", dict))
+    _check_scale(folder, tensors, config)
     return Resumed(State(step, tensors), config, sha)
+
+
+def _check_scale(folder: Path, tensors: dict[str, Tensor], config: PaperConfig) -> None:
+    """Refuse a config that would make far larger networks than those on disk, before they are made."""
+    least = config.nets.hidden**2 * (config.charts if config.mode == "multi-chart" else 1)
+    found = sum(tensor.numel() for name, tensor in tensors.items() if name.startswith("networks."))
+    if found < least:
+        raise InputError(f"{folder}: {found} weights, expected at least {least} for its config; use another checkpoint")
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -34,7 +34,7 @@ class Affine(Dense):
         """(…, n, c_in) → (…, n, c_out) in x's dtype, bias included in the product."""
         weight, bias = self.weight.to(x.dtype), self.bias.to(x.dtype)
         if weight.ndim == 2:
-            return torch.addmm(bias, x, weight)
+            return torch.addmm(bias, x, weight) if x.ndim == 2 else x @ weight + bias
         return torch.baddbmm(bias, x.expand(weight.shape[0], -1, -1), weight)
 
     def run_jet(self, x: Tensor) -> Tensor:
