@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
-from . import __version__, check_maps, check_outputs, load, unwrap_asset, write_textures
+from . import __version__, load, unwrap_asset
+from .bake.output import check_maps, check_outputs, write_textures
 from .runtime.errors import FlexparaError, InputError
 from .runtime.options import Options, Outputs
 from .runtime.progress import Clock, progress_bars

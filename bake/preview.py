@@ -16,9 +16,9 @@ from ..runtime.errors import ShapeError
 from .canvas import Camera, Lines, Shape, draw, three_quarter_axes
 from .color import chart_colors, linear_from_oklab, linear_from_srgb
 from .context import open_context
-from .gbuffer import border_edges
 from .glyphs import ROWS, text_mask
 from .images import Texture, write_png
+from .layout import border_edges
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
+from dataclasses import asdict
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,14 +47,14 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     Returns the surfaces it was asked to train, for tests of what happens before and after training.
     """
     torch = pytest.importorskip("torch")
+    from flexpara.export import unwrapping
     from flexpara.runtime.mesh import Charts, Frame
-    from flexpara.train.config import NetConfig
+    from flexpara.train.config import NetConfig, TrainConfig
     from flexpara.train.networks import AtlasNetworks
 
     trained: list[Surface] = []
 
-    def train(surface: Surface, settings: object, progress: Progress | None = None) -> SimpleNamespace:
-        del settings
+    def train(surface: Surface, settings: TrainConfig, progress: Progress | None = None) -> SimpleNamespace:
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)
@@ -63,10 +63,9 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
             charts=Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",)),
             networks=AtlasNetworks(1, NetConfig(), generator=torch.Generator().manual_seed(0)),
             frame=Frame.of(surface.vertices),
+            settings=asdict(settings),
             report={},
         )
 
-    module = ModuleType("flexpara.train.pipeline")
-    module.train = train  # pyright: ignore[reportAttributeAccessIssue]
-    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(unwrapping, "train", train)
     return trained

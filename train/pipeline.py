@@ -5,7 +5,7 @@ surface (source units) → unit ball → joint training → finishing → patche
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -40,12 +40,13 @@ class Trained:
     """Result of training.
 
     charts: valid, in source units.  networks: unit ball → logits (n, p) and chart uv (n, p, 2) in source units.
-    frame: source units → unit ball.  report: JSON-ready facts.
+    frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.
     """
 
     charts: Charts
     networks: AtlasNetworks
     frame: Frame
+    settings: dict[str, Any]
     report: dict[str, Any]
 
 
@@ -71,7 +72,7 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
         "slit_length": sum(piece.slits for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
-    return Trained(charts, networks, frame, report)
+    return Trained(charts, networks, frame, asdict(config), report)
 
 
 def in_turn(progress: Progress) -> Callable[[str], None]:

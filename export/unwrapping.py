@@ -1,0 +1,120 @@
+"""From a mesh to everything that is written about it: train, finish, pack, measure, export.
+
+`train_asset` and `assemble` are the two halves: what is trained may be kept on disk between them (train/saved.py).
+Positions in source units, uv in [0, 1]² of the atlas, sizes in texels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..runtime.agreement import agreement
+from ..runtime.metrics import measure
+from ..runtime.packing import pack
+from ..runtime.session import UnwrapSession
+from ..train.config import TrainConfig
+from ..train.paper.config import Ablation, PaperConfig
+from ..train.pipeline import train
+from .metadata import Provenance
+from .onnx import export_onnx
+
+if TYPE_CHECKING:
+    from ..runtime.mesh import Asset, Atlas, Charts, Frame
+    from ..runtime.options import Options
+    from ..runtime.progress import Clock
+    from ..train.checkpoint import Checkpoints
+    from ..train.networks import AtlasNetworks
+    from ..train.pipeline import Trained
+
+REPORT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Unwrapped:
+    """An unwrapped mesh.
+
+    charts: flat, not packed.  frame: source units → unit ball.  atlas: packed charts.
+    model: the torch module behind the ONNX file.  onnx: the bytes of that file.
+    report: changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON.
+    """
+
+    charts: Charts
+    frame: Frame
+    atlas: Atlas
+    model: AtlasNetworks
+    onnx: bytes = field(repr=False)
+    report: dict[str, Any] = field(repr=False)
+
+
+def train_asset(asset: Asset, options: Options, clock: Clock, checkpoints: Checkpoints | None = None) -> Trained:
+    """Charts and networks by the preset asked for.  checkpoints: of preset paper; None keeps none.
+
+    Raises: InputError for checkpoints of another run; FinishError (a defect).
+    """
+    if options.preset == "paper":
+        from ..train.paper.pipeline import train_paper_surface
+
+        return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints)
+    return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
+
+
+def assemble(asset: Asset, trained: Trained, options: Options, clock: Clock) -> Unwrapped:
+    """Pack, measure, export.
+
+    Raises: ParityError when the exported network and torch disagree.
+    """
+    with clock.stage("pack"):
+        atlas = pack(asset, trained.charts, size=options.size, padding=options.margin, seed=options.seed)
+    with clock.stage("measure"):
+        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=options.size)
+    report: dict[str, Any] = {
+        "format_version": REPORT_VERSION,
+        "version": __version__,
+        "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
+        "changes": asset.changes,
+        "settings": {
+            **trained.settings,
+            "size": options.size,
+            "padding": options.margin,
+            "preset": options.preset,
+        },
+        "methods": list(trained.charts.method),
+        "metrics": metrics.to_dict(),
+        "train": trained.report,
+    }
+    with clock.stage("export"), TemporaryDirectory() as folder:
+        path = Path(folder) / "atlas.onnx"
+        facts = Provenance(asset.sha256, report["settings"], report["metrics"])
+        parity = export_onnx(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
+        network = agreement(UnwrapSession(path), atlas, seed=options.seed)
+        onnx = path.read_bytes()
+    report |= {"parity": asdict(parity), "network": network.to_dict()}
+    report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
+    return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report)
+
+
+def paper_config(options: Options) -> PaperConfig:
+    """The settings of preset paper that these options ask for."""
+    plain = PaperConfig()
+    names = options.ablation
+    return replace(
+        plain,
+        mode=options.mode,
+        charts=options.charts,
+        seed=options.seed,
+        steps=options.steps or plain.steps,
+        dtype=options.precision,
+        nets=replace(plain.nets, hidden=options.width or plain.nets.hidden),
+        ablation=Ablation(
+            triangle="no-triangle" not in names,
+            differential="no-differential" not in names,
+            upper="no-upper" not in names,
+            lower="no-lower" not in names,
+            chart_bidirectional="bidirectional" in names,
+            chart_differential="chart-differential" in names,
+        ),
+    )
