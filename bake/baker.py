@@ -1,28 +1,39 @@
 """Baking: one context, one G-buffer, every map a function of it; then gutters; files last.
 
-h w texels, row 0 = top.  `bake` makes Textures in memory, `write_textures` makes files of them.
+h w texels, row 0 = top · t texels of one call.  `bake` makes Textures in memory, `write_textures` makes files of them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..runtime.errors import InputError
+from ..runtime.mesh import Asset, Surface
 from .context import open_context
 from .gbuffer import GBuffer, rasterize
-from .gutter import Gutter, find_gutter
+from .gutter import find_gutter
 from .images import Texture, write_texture
+from .layout import check_size
 from .maps import BakeMap, NormalFormat, find_map
+from .tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from ..runtime.mesh import Asset, Atlas
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..runtime.mesh import Atlas
     from .images import FileType
+    from .layout import Window
+    from .tiles import Device
+
+SurfaceFunction = Callable[["NDArray[np.float32]", "NDArray[np.float32]", "NDArray[np.int64]"], "ArrayLike"]
 
 WRITERS = 2
 """Files encoded at once: each holds a whole image in memory."""
@@ -30,62 +41,138 @@ WRITERS = 2
 
 def bake(
     atlas: Atlas,
-    asset: Asset,
-    maps: Sequence[str | BakeMap],
+    asset: Asset | Mapping[str, SurfaceFunction],
+    maps: Sequence[str | BakeMap] | Mapping[str, SurfaceFunction] | None = None,
     *,
     size: int | None = None,
     padding: int | None = None,
+    samples: int = 1,
     normal_format: NormalFormat = "opengl",
+    device: Device = "auto",
+    limit: int | None = None,
+    tile: tuple[int, int] | None = None,
     progress: Callable[[str], None] | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> dict[str, Texture]:
-    """Bake maps of an atlas.
+    """Bake maps of an atlas, or functions of its surface: `bake(atlas, {"mymap": f})`.
 
     Args:
         atlas: what is drawn; its faces are those of `asset`, in the same order.
-        asset: source of colours, normals and textures.
-        maps: names (see `maps.MAP_NAMES`) or maps of one's own; the order is kept.
+        asset: source of colours, normals and textures; may be left out where maps are functions.
+        maps: names (see `maps.MAP_NAMES`) or maps of one's own; the order is kept.  Or name → function of positions
+            (t, 3), unit normals (t, 3), both float32, and face numbers (t,) int64, which returns (t,) or (t, 1 to 4).
         size: texels per side; the atlas' own unless given.
         padding: texels of gutter around the charts; None fills the whole image.
+        samples: 1, 4 or 16 per texel.
         normal_format: green channel of the tangent-space normal map, opengl (+Y) or directx (−Y).
+        device: "auto", "opengl" or "software", see `tiles.open_rasterizer`.
+        limit: the largest side drawn at once, in samples; what the device allows unless given.
+        tile: the UDIM tile (a, b) to draw, see `udim.py`.
         progress: called with each map's name before it is made.
+        warn: called with one line when OpenGL cannot be had and numpy draws instead.
 
     Returns: name → Texture, linear float32 pixels (size, size, c).
 
     Raises: InputError for an unknown map, a size or uv that cannot be drawn, a map that lacks its source;
-        MissingDependencyError without OpenGL.
+        MissingDependencyError when "opengl" is asked for and cannot be had.
     """
-    chosen = [find_map(entry, normal_format=normal_format) if isinstance(entry, str) else entry for entry in maps]
+    if isinstance(asset, Mapping):
+        if maps is not None:
+            raise InputError(
+                "two collections of maps, expected one; pass bake(atlas, functions) or (atlas, asset, maps)"
+            )
+        atlas, asset, maps = replace(atlas, source_vertex=np.arange(len(atlas.positions))), surface_alone(atlas), asset
+    chosen = find_maps(maps or (), normal_format=normal_format)
     if not chosen:
         return {}
-    gbuffer = make_gbuffer(atlas, size if size is not None else atlas.size)
-    gutter = find_gutter(gbuffer.face >= 0, padding)
-    textures: dict[str, Texture] = {}
+    texels = atlas.size if size is None else size
+    if texels < 1:
+        raise InputError(f"size {texels}: expected 1 texel or more per side; pass size=, for instance 2048")
+    plan = Plan(texels, 0 if padding is None else padding, samples, limit, tile)
+    drawn = [entry for entry in chosen if not entry.everywhere]
+    pixels: dict[str, NDArray[np.float32]] = {}
+    if drawn:
+        with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
+            covered = np.zeros((texels, texels), np.bool_)
+            for window, held, parts in map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress):
+                covered[window.rows, window.columns] = held
+                for name, part in parts.items():
+                    pixels[name] = put(pixels.get(name), window, part, texels)
+        if padding is None:
+            gutter = find_gutter(covered, None)
+            pixels = {name: gutter.fill(image, image[0, 0]) for name, image in pixels.items()}
     for entry in chosen:
-        if progress is not None:
-            progress(entry.name)
-        textures[entry.name] = bake_map(entry, gbuffer, gutter, atlas, asset)
-    return textures
+        if entry.everywhere:
+            _announce(progress, entry.name)
+            pixels[entry.name] = computed(entry, blank_gbuffer(texels), atlas, asset)
+    return {entry.name: as_texture(entry, pixels[entry.name]) for entry in chosen}
+
+
+def find_maps(
+    maps: Sequence[str | BakeMap] | Mapping[str, SurfaceFunction], *, normal_format: NormalFormat = "opengl"
+) -> list[BakeMap]:
+    """Names, maps and functions → maps.  Raises: InputError for an unknown name."""
+    if isinstance(maps, Mapping):
+        return [function_map(name, function) for name, function in maps.items()]
+    return [find_map(entry, normal_format=normal_format) if isinstance(entry, str) else entry for entry in maps]
+
+
+def function_map(name: str, function: SurfaceFunction) -> BakeMap:
+    """A map out of a function of positions, normals and face numbers, which is called with many texels at a time.
+
+    Any space and range; linear, EXR float (1 to 4 channels).
+    """
+
+    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+        del atlas, asset
+        position, normal = gbuffer.position.reshape(-1, 3), gbuffer.normal.reshape(-1, 3)
+        face, result = gbuffer.face.reshape(-1), None
+        for texels in gbuffer.chunks():
+            values = np.asarray(function(position[texels], normal[texels], face[texels].astype(np.int64)), np.float32)
+            if values.ndim not in (1, 2) or len(values) != len(texels):
+                expected = f"({len(texels)},) or ({len(texels)}, 1 to 4)"
+                raise InputError(f"map {name}: its function returned {values.shape}; expected {expected}")
+            values = values.reshape(len(texels), -1)
+            result = np.zeros((face.size, values.shape[1]), np.float32) if result is None else result
+            result[texels] = values
+        return (np.zeros((face.size, 1), np.float32) if result is None else result).reshape(*gbuffer.shape, -1)
+
+    return BakeMap(name, "any", "any", "any", "linear", "exr", 32, compute, (0.0, 0.0, 0.0))
+
+
+def surface_alone(atlas: Atlas) -> Asset:
+    """The atlas' own mesh as an asset without colours and textures, in the atlas' vertices."""
+    surface = Surface(atlas.positions, atlas.faces)
+    return Asset(
+        atlas.positions, atlas.faces, np.arange(len(atlas.positions)), surface, normals=atlas.normals.astype(np.float64)
+    )
 
 
 def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
     """Rasterize in a context of its own.  Raises as `open_context` and `rasterize`."""
-    if size < 1:
-        raise InputError(f"size {size}: expected 1 texel or more per side; pass size=, for instance 2048")
+    check_size(size)
     with open_context() as context:
         return rasterize(context, atlas, size)
 
 
-def bake_map(entry: BakeMap, gbuffer: GBuffer, gutter: Gutter, atlas: Atlas, asset: Asset) -> Texture:
-    """One map: compute, background, gutter.
+def put(image: NDArray[np.float32] | None, window: Window, part: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """The image (size, size, c) with a part in its window; made by the first part, given alpha 1 by the first with it.
 
-    Raises: InputError when the function returns another shape than (h, w, 1 to 4).
+    The number of channels may differ from window to window: a map leaves out alpha where it is 1.
     """
-    pixels = entry.compute(gbuffer, atlas, asset)
-    if pixels.ndim != 3 or pixels.shape[:2] != gbuffer.shape or not 1 <= pixels.shape[2] <= 4:
-        raise InputError(f"map {entry.name}: its function returned {pixels.shape}; expected (*{gbuffer.shape}, 1 to 4)")
-    pixels = np.asarray(pixels, np.float32)
-    if not entry.everywhere:
-        pixels = gutter.fill(pixels, np.asarray((*entry.background, 1.0)[: pixels.shape[2]], np.float32))
+    channels = part.shape[2]
+    if image is None:
+        image = np.zeros((size, size, channels), np.float32)
+    if channels > image.shape[2]:
+        image = np.concatenate([image, np.ones((size, size, channels - image.shape[2]), np.float32)], axis=2)
+    target = image[window.rows, window.columns]
+    target[..., :channels] = part
+    target[..., channels:] = 1.0
+    return image
+
+
+def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:
+    """Pixels with what the map says of them."""
     metadata = {"map": entry.name, "space": entry.space, "units": entry.units, "range": entry.value_range}
     return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)
 
@@ -114,6 +201,11 @@ def write_textures(
     with ThreadPoolExecutor(WRITERS) as pool:
         list(pool.map(write_texture, textures.values(), paths))  # list: waits, and raises what was raised
     return paths
+
+
+def _announce(progress: Callable[[str], None] | None, name: str) -> None:
+    if progress is not None:
+        progress(name)
 
 
 def _ending(texture: Texture | BakeMap, file_type: FileType | None) -> FileType:

@@ -14,7 +14,7 @@ it depends neither on the device nor on the windows; software.py comes to the sa
 
 from __future__ import annotations
 
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -23,12 +23,10 @@ import numpy as np
 
 from ..runtime.errors import InputError
 from .context import drawing_into, max_texture_size, moderngl
-from .layout import Layout, Planes, Window, check_size, windows
+from .layout import Layout, Planes, Window, windows
 from .shaders import build_program
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas
@@ -126,29 +124,16 @@ def rasterize(context: moderngl.Context, atlas: Atlas, size: int, *, limit: int 
     """Draw the atlas into size × size texels.
 
     limit: the largest side drawn at once, in texels; what the device allows unless given.  It doesn't change a bit.
-    Raises: InputError for a size below 1, for uv outside [0, 1], for more faces than the device can hold.
+    Raises: InputError for a size out of range, for uv outside [0, 1], for more faces than the device can hold.
     """
-    check_size(size)
+    layout = Layout.of(atlas, size)
+    pieces = windows(size, min(max_texture_size(context), limit or size), WINDOW)
     planes = Planes.of(size, size)
-    with rasterizer(context, atlas, size, limit=limit) as drawn:
-        for window in drawn.windows:
+    with ExitStack() as stack:
+        drawn = DeviceRasterizer(context, stack, atlas, layout, (pieces[0].height, pieces[0].width))
+        for window in pieces:
             drawn.draw(window, planes.part(window.rows, window.columns))
     return GBuffer.of(planes, size=size)
-
-
-@contextmanager
-def rasterizer(
-    context: moderngl.Context, atlas: Atlas, size: int, *, limit: int | None = None, texels: int = WINDOW
-) -> Iterator[DeviceRasterizer]:
-    """What draws windows of the atlas at size × size; its objects on the device live as long as the block.
-
-    limit: the largest side of a window.  texels: about how many a window has.  Raises as `rasterize`.
-    """
-    check_size(size)
-    check_faces(context, len(atlas.faces))
-    side = min(max_texture_size(context), limit or size)
-    with ExitStack() as stack:
-        yield DeviceRasterizer(context, stack, atlas, Layout.of(atlas, size), windows(size, side, texels))
 
 
 def check_faces(context: moderngl.Context, count: int) -> None:
@@ -160,15 +145,19 @@ def check_faces(context: moderngl.Context, count: int) -> None:
 
 
 class DeviceRasterizer:
-    """An atlas on an OpenGL device.  `windows` covers the image once; any window no larger can be drawn."""
+    """An atlas on an OpenGL device, laid into an image; draws any window of it up to its capacity."""
 
     def __init__(
-        self, context: moderngl.Context, stack: ExitStack, atlas: Atlas, layout: Layout, windows: list[Window]
+        self, context: moderngl.Context, stack: ExitStack, atlas: Atlas, layout: Layout, capacity: tuple[int, int]
     ) -> None:
-        """All objects are released by the stack."""
-        self.layout, self.windows = layout, windows
+        """capacity: height and width of the largest window, texels.  All objects are released by the stack.
+
+        Raises: InputError for more faces than the device can hold.
+        """
+        check_faces(context, len(atlas.faces))
+        self.layout = layout
         self._context = context
-        self._width, self._height = max(w.width for w in windows), max(w.height for w in windows)
+        self._height, self._width = capacity
         self._corners = _corner_texture(context, stack, atlas, layout)
         self._targets = _targets(context, stack, self._width, self._height)
         self._nothing = np.full((self._height, self._width), -1, np.int32)
@@ -180,7 +169,7 @@ class DeviceRasterizer:
     def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
         """The G-buffer of a window, read into planes of its shape where given: they are then used, not copied.
 
-        Raises: InputError for a window larger than the largest of `windows`.
+        Raises: InputError for a window beyond the capacity.
         """
         if window.height > self._height or window.width > self._width:
             raise InputError(

@@ -43,6 +43,15 @@ class Window:
         """Its columns of the image."""
         return slice(self.column, self.column + self.width)
 
+    def scaled(self, by: int) -> Window:
+        """The same window of an image `by` times as large."""
+        return Window(by * self.row, by * self.column, by * self.height, by * self.width)
+
+    def within(self, other: Window) -> tuple[slice, slice]:
+        """Its rows and columns in an array of the other window, which holds it."""
+        row, column = self.row - other.row, self.column - other.column
+        return slice(row, row + self.height), slice(column, column + self.width)
+
     def grown(self, by: int, size: int) -> Window:
         """The window with `by` texels more all round, cut to the image of size × size."""
         row, column = max(self.row - by, 0), max(self.column - by, 0)
@@ -81,11 +90,15 @@ class Layout:
     radius: NDArray[np.float32]
 
     @classmethod
-    def of(cls, atlas: Atlas, size: int) -> Layout:
-        """Raises: InputError for a size out of range, or uv outside [0, 1]."""
+    def of(cls, atlas: Atlas, size: int, tile: tuple[int, int] | None = None) -> Layout:
+        """Lay out the unit square, or the UDIM tile of uv [a, a + 1] × [b, b + 1] for tile (a, b).
+
+        Raises: InputError for a size out of range, or uv outside [0, 1] where no tile is given.
+        """
         check_size(size)
-        check_uv(atlas.uv)
-        place = atlas.uv.astype(np.float64) * size
+        if tile is None:
+            check_uv(atlas.uv)
+        place = (atlas.uv.astype(np.float64) - (tile or (0, 0))) * size
         place[:, 1] = size - place[:, 1]
         texel, edges = place.astype(np.float32)[atlas.faces], border_edges(atlas.faces, atlas.uv)
         face, corner = edges.T
@@ -117,6 +130,12 @@ class Planes(NamedTuple):
         """New arrays."""
         four = (height, width, 4)
         return cls(np.zeros(four, np.float32), np.zeros(four, np.float32), np.full((height, width), -1, np.int32))
+
+    def shaped(self, height: int, width: int) -> Planes:
+        """The first height · width texels as planes of that shape: memory used again."""
+        position, normal = (plane.reshape(-1, 4)[: height * width] for plane in (self.position, self.normal))
+        face = self.face.reshape(-1)[: height * width].reshape(height, width)
+        return Planes(position.reshape(height, width, 4), normal.reshape(height, width, 4), face)
 
     def part(self, rows: slice, columns: slice) -> Planes:
         """A view of some rows and columns."""

@@ -27,11 +27,11 @@ SPANS = 1 << 20
 FAR = np.iinfo(np.int64).max
 
 
-def rasterize_in_software(atlas: Atlas, size: int) -> GBuffer:
-    """The whole image, as `gbuffer.rasterize`.  Raises: InputError as `SoftwareRasterizer`."""
+def rasterize_in_software(atlas: Atlas, size: int, *, limit: int | None = None) -> GBuffer:
+    """The whole image, as `gbuffer.rasterize`.  Raises: InputError for a size out of range, or as the rasterizer."""
+    drawn = SoftwareRasterizer(atlas, Layout.of(atlas, size))
     planes = Planes.of(size, size)
-    drawn = SoftwareRasterizer(atlas, size)
-    for window in drawn.windows:
+    for window in windows(size, limit or size, WINDOW):
         drawn.draw(window, planes.part(window.rows, window.columns))
     return GBuffer.of(planes, size=size)
 
@@ -39,15 +39,11 @@ def rasterize_in_software(atlas: Atlas, size: int) -> GBuffer:
 class SoftwareRasterizer:
     """An atlas laid into an image; draws any window of it, as `gbuffer.DeviceRasterizer` does."""
 
-    def __init__(self, atlas: Atlas, size: int, *, limit: int | None = None, texels: int = WINDOW) -> None:
-        """limit: the largest side of a window.  texels: about how many a window has.
-
-        Raises: InputError for a size out of range, no face, or uv outside [0, 1].
-        """
+    def __init__(self, atlas: Atlas, layout: Layout) -> None:
+        """Raises: InputError for no face."""
         if len(atlas.faces) == 0:
             raise InputError("0 faces: expected at least one; check the mesh")
-        self.layout = Layout.of(atlas, size)
-        self.windows = windows(size, limit or size, texels)
+        self.layout = layout
         self._positions, self._normals, self._faces = atlas.positions, atlas.normals, atlas.faces
         self._snapped = np.floor(self.layout.texel * np.float32(ONE) + np.float32(0.5)).astype(np.int64)
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import bake, texture_names, write_textures
+from flexpara.bake.baker import bake, make_gbuffer, texture_names, write_textures
 from flexpara.bake.gbuffer import GBuffer
 from flexpara.bake.images import read_image
-from flexpara.bake.maps import BakeMap, find_map
-from flexpara.runtime.errors import InputError
+from flexpara.bake.maps import MAP_NAMES, BakeMap, find_map
+from flexpara.bake.tiles import SoftwareWarning
+from flexpara.runtime.errors import InputError, MissingDependencyError
 from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
@@ -31,7 +33,8 @@ def custom(result: np.ndarray | None = None) -> BakeMap:
 def test_maps_come_in_the_order_asked_for(quad: Pair) -> None:
     names: list[str] = []
     textures = bake(*quad, ["uv-checker", "position", "normal"], progress=names.append)
-    assert list(textures) == names == ["uv-checker", "position", "normal"]
+    assert list(textures) == ["uv-checker", "position", "normal"]
+    assert sorted(names) == ["normal", "position", "uv-checker"]
     assert {texture.pixels.shape for texture in textures.values()} == {(64, 64, 3)}
     assert {texture.pixels.dtype for texture in textures.values()} == {np.dtype(np.float32)}
 
@@ -45,7 +48,7 @@ def test_position_of_the_unit_quad_is_exact_to_1e_5(quad: Pair) -> None:
 
 
 def test_no_maps_need_no_context(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.baker.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.tiles.open_context", lambda: pytest.fail("opened a context"))
     assert bake(*quad, []) == {}
 
 
@@ -98,6 +101,114 @@ def test_a_function_of_the_wrong_shape_is_named(quad: Pair) -> None:
         bake(*quad, [custom(np.zeros((3, 3, 1)))])
 
 
+def test_a_function_of_the_surface_needs_no_asset(two_charts: Pair) -> None:
+    calls: list[tuple[tuple[int, ...], ...]] = []
+
+    def height_and_face(position: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:
+        calls.append((position.shape, normal.shape, face.shape))
+        assert face.min() >= 0
+        return np.column_stack([position[:, 2], face, normal[:, 2]])
+
+    pixels = bake(two_charts[0], {"mymap": height_and_face}, size=32, padding=0)["mymap"].pixels
+    gbuffer = make_gbuffer(two_charts[0], 32)
+    covered = gbuffer.face >= 0
+    np.testing.assert_array_equal(pixels[..., 0], gbuffer.position[..., 2])
+    np.testing.assert_array_equal(pixels[covered, 1], gbuffer.face[covered])
+    assert calls == [((covered.sum(), 3), (covered.sum(), 3), (covered.sum(),))]
+
+
+def test_a_function_may_return_one_number_a_texel_and_nothing_else(two_charts: Pair) -> None:
+    ones = bake(two_charts[0], {"ones": lambda position, *_: np.ones(len(position))}, size=16)["ones"].pixels
+    np.testing.assert_array_equal(ones, np.ones((16, 16, 1)))
+    with pytest.raises(InputError, match=r"map bad: its function returned \(1,\)"):
+        bake(two_charts[0], {"bad": lambda *_: np.ones(1)}, size=16)
+    with pytest.raises(InputError, match="expected one"):
+        bake(two_charts[0], {}, {})
+
+
+@pytest.mark.parametrize("limit", [24, 31, 60])
+@pytest.mark.parametrize("samples", [1, 4])
+def test_tiles_change_no_bit_of_any_map(sphere: Pair, limit: int, samples: int) -> None:
+    atlas, asset = sphere
+    maps = [name for name in MAP_NAMES if name not in ("vertex-color",)]
+    whole = bake(atlas, asset, maps, size=60, padding=3, samples=samples)
+    tiled = bake(atlas, asset, maps, size=60, padding=3, samples=samples, limit=limit)
+    for name in maps:
+        assert whole[name].pixels.tobytes() == tiled[name].pixels.tobytes(), name
+
+
+def test_the_software_rasterizer_bakes_the_same(sphere: Pair) -> None:
+    names = ["position", "chart", "face-id"]
+    first, second = (bake(*sphere, names, size=64, padding=3, device=device) for device in ("opengl", "software"))
+    np.testing.assert_array_equal(first["face-id"].pixels, second["face-id"].pixels)
+    np.testing.assert_array_equal(first["chart"].pixels, second["chart"].pixels)
+    assert np.abs(first["position"].pixels - second["position"].pixels).max() < 1e-5
+
+
+def test_without_opengl_numpy_draws_and_says_so(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> None:
+        raise MissingDependencyError("no OpenGL 3.3 context could be made: apt-get install libegl1")
+
+    monkeypatch.setattr("flexpara.bake.tiles.open_context", absent)
+    said: list[str] = []
+    expected = bake(*quad, ["position"], size=16, device="software")["position"].pixels
+    np.testing.assert_array_equal(bake(*quad, ["position"], size=16, warn=said.append)["position"].pixels, expected)
+    assert len(said) == 1
+    assert "slower" in said[0]
+    assert "apt-get install" in said[0]
+    with pytest.warns(SoftwareWarning, match="slower"):
+        bake(*quad, ["position"], size=16)
+    with pytest.raises(MissingDependencyError):
+        bake(*quad, ["position"], size=16, device="opengl")
+    with pytest.raises(InputError, match="device 'cuda'"):
+        bake(*quad, ["position"], size=16, device="cuda")  # pyright: ignore[reportArgumentType]
+
+
+def test_supersampling_comes_closer_to_the_mean_over_a_texel(quad: Pair) -> None:
+    def stripes(position: np.ndarray, *_: np.ndarray) -> np.ndarray:
+        return np.sin(40.0 * position[:, 0])  # 6.4 texels a wave at this size
+
+    edges = np.linspace(0, 1, 33)
+    mean = -np.diff(np.cos(40.0 * edges)) / 40.0 * 32
+    errors = [
+        np.abs(bake(quad[0], {"f": stripes}, size=32, samples=n)["f"].pixels[..., 0] - mean).max() for n in (1, 4, 16)
+    ]
+    assert errors[1] < 0.3 * errors[0]
+    assert errors[2] < 0.3 * errors[1]
+
+
+def test_supersampled_borders_are_means_of_the_surface_alone(two_charts: Pair) -> None:
+    ones = {"ones": lambda position, *_: np.ones(len(position))}
+    single, many = (bake(two_charts[0], ones, size=50, padding=0, samples=n)["ones"].pixels for n in (1, 16))
+    assert set(np.unique(many)) == {0.0, 1.0}
+    assert (many <= single).all()
+    assert many.sum() > 0.9 * single.sum()
+
+
+def test_supersampled_normals_stay_unit_and_face_numbers_whole(sphere: Pair) -> None:
+    textures = bake(*sphere, ["normal-object", "face-id"], size=40, padding=0, samples=16)
+    length = np.linalg.norm(textures["normal-object"].pixels, axis=-1)
+    covered = length > 0
+    assert covered.mean() > 0.5
+    assert np.abs(length[covered] - 1).max() < 1e-5
+    face = textures["face-id"].pixels
+    np.testing.assert_array_equal(face, np.round(face))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"samples": 2}, "samples 2"),
+        ({"padding": -1}, "padding -1"),
+        ({"limit": 5, "padding": 3}, "padding 3: too wide"),
+        ({"samples": 16, "size": 30000}, "size 120000"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused(quad: Pair, changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        bake(*quad, ["position"], **{"size": 16, **changes})
+
+
 @pytest.mark.parametrize(("size", "text"), [(0, "size 0"), (10**6, "size 1000000: expected 1 to")])
 def test_a_size_that_cannot_be_drawn_is_refused(quad: Pair, size: int, text: str) -> None:
     with pytest.raises(InputError, match=text):
@@ -105,7 +216,7 @@ def test_a_size_that_cannot_be_drawn_is_refused(quad: Pair, size: int, text: str
 
 
 def test_an_unknown_map_is_refused_before_any_work(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.baker.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.tiles.open_context", lambda: pytest.fail("opened a context"))
     with pytest.raises(InputError, match="unknown map 'nope'"):
         bake(*quad, ["position", "nope"])
 

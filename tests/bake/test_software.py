@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.gbuffer import GBuffer, rasterize
-from flexpara.bake.software import SoftwareRasterizer, rasterize_in_software
+from flexpara.bake.software import rasterize_in_software
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.meshfile import load_asset
@@ -68,20 +68,16 @@ def test_a_sphere_and_two_charts_equal_the_device(
 
 
 def test_windows_change_no_bit(sphere: Pair) -> None:
-    whole = rasterize_in_software(sphere[0], 64)
-    drawn = SoftwareRasterizer(sphere[0], 64, limit=19)
-    assert len(drawn.windows) == 16
-    for window in drawn.windows:
-        part = drawn.draw(window)
-        assert part.position.tobytes() == whole.position[window.rows, window.columns].tobytes()
-        assert part.face.tobytes() == whole.face[window.rows, window.columns].tobytes()
+    whole, tiled = rasterize_in_software(sphere[0], 64), rasterize_in_software(sphere[0], 64, limit=19)
+    for name in ("position", "normal", "second", "third", "face"):
+        assert getattr(whole, name).tobytes() == getattr(tiled, name).tobytes()
 
 
 def test_nothing_to_draw_and_no_size_are_refused(quad: Pair) -> None:
     with pytest.raises(InputError, match="0 faces"):
-        SoftwareRasterizer(replace(quad[0], faces=np.zeros((0, 3), np.int64)), 8)
+        rasterize_in_software(replace(quad[0], faces=np.zeros((0, 3), np.int64)), 8)
     with pytest.raises(InputError, match="size 0"):
-        SoftwareRasterizer(quad[0], 0)
+        rasterize_in_software(quad[0], 0)
 
 
 def test_a_real_mesh_equals_the_device(models: Path, context: moderngl.Context) -> None:

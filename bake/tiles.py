@@ -1,0 +1,195 @@
+"""Maps window by window: what is drawn at once is bounded, whatever the size of the image.
+
+h w texels · k samples along a texel's side.  A window is drawn with a halo as wide as the padding, so that its gutters
+come out as they would in the whole image.  The arrays that windows are drawn into are used again for the next window.
+"""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from ..runtime.errors import InputError, MissingDependencyError
+from .context import max_texture_size, open_context
+from .gbuffer import DeviceRasterizer, GBuffer
+from .gutter import find_gutter
+from .layout import Layout, Planes, Window, check_size, windows
+from .software import SoftwareRasterizer
+from .supersample import averaged, covered_texels, first_covered, samples_along
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..runtime.mesh import Asset, Atlas
+    from .maps import BakeMap
+
+Device = Literal["auto", "opengl", "software"]
+DEVICES: tuple[Device, ...] = ("auto", "opengl", "software")
+
+WINDOW = 1 << 22
+"""Samples drawn at once, about: 150 MB of targets and arrays."""
+
+
+class SoftwareWarning(UserWarning):
+    """OpenGL cannot be had: numpy draws, with the same result, slower."""
+
+
+class Rasterizer(Protocol):
+    """What draws windows: `DeviceRasterizer` or `SoftwareRasterizer`."""
+
+    def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
+        """The G-buffer of a window."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How an image is cut into windows.
+
+    size: texels per side.  halo: texels around each window that are drawn with it.  samples: 1, 4 or 16 per texel.
+    limit: the largest side that is drawn at once, in samples; None leaves it to the device.
+    tile: the UDIM tile (a, b), uv [a, a + 1] × [b, b + 1]; None is the unit square, and uv must be inside.
+
+    Raises: InputError for a value out of range.
+    """
+
+    size: int
+    halo: int = 0
+    samples: int = 1
+    limit: int | None = None
+    tile: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        check_size(self.size)
+        check_size(self.size * self.along)
+        if self.halo < 0:
+            raise InputError(f"padding {self.halo}: expected 0 texels or more, or None for the whole image")
+
+    @property
+    def along(self) -> int:
+        """Samples along the side of a texel."""
+        return samples_along(self.samples)
+
+    def windows(self, device_limit: int) -> list[Window]:
+        """Windows of the image, in texels, without their halo.
+
+        Raises: InputError where the limit leaves nothing beside the halo.
+        """
+        most = min(self.limit or device_limit, device_limit)
+        side = most // self.along
+        if side < self.size:
+            side -= 2 * self.halo
+        if side < 1:
+            raise InputError(
+                f"padding {self.halo}: too wide to be drawn {most} samples at a time; choose a smaller one"
+            )
+        return windows(self.size, side, max(WINDOW // self.along**2, 1))
+
+    def drawn(self, window: Window) -> Window:
+        """The window with its halo, in texels."""
+        return window.grown(self.halo, self.size)
+
+    def capacity(self, pieces: Sequence[Window]) -> tuple[int, int]:
+        """Height and width of the largest window with halo, in samples."""
+        grown = [self.drawn(window) for window in pieces]
+        return self.along * max(w.height for w in grown), self.along * max(w.width for w in grown)
+
+
+@contextmanager
+def open_rasterizer(
+    atlas: Atlas, plan: Plan, *, device: Device = "auto", warn: Callable[[str], None] | None = None
+) -> Iterator[tuple[Rasterizer, list[Window]]]:
+    """A rasterizer of the atlas and the windows to draw.
+
+    device: "opengl", "software" (numpy: the same result, slower), or "auto": numpy where no OpenGL device answers.
+    warn: called with one line when "auto" had to take numpy; without it a `SoftwareWarning` is issued.
+    Raises: InputError as `gbuffer.rasterize`; MissingDependencyError when "opengl" cannot be had.
+    """
+    if device not in DEVICES:
+        raise InputError(f"device {device!r}: expected one of {', '.join(DEVICES)}")
+    layout = Layout.of(atlas, plan.size * plan.along, plan.tile)
+    with ExitStack() as stack:
+        if device != "software":
+            try:
+                context = stack.enter_context(open_context())
+            except MissingDependencyError as error:
+                if device == "opengl":
+                    raise
+                _say(f"baking without OpenGL, which is slower, since {error}", warn)
+            else:
+                limit = max_texture_size(context)
+                pieces = plan.windows(limit)
+                yield DeviceRasterizer(context, stack, atlas, layout, plan.capacity(pieces)), pieces
+                return
+        yield SoftwareRasterizer(atlas, layout), plan.windows(plan.size * plan.along)
+
+
+def map_windows(
+    rasterizer: Rasterizer,
+    pieces: Sequence[Window],
+    plan: Plan,
+    entries: Sequence[BakeMap],
+    atlas: Atlas,
+    asset: Asset,
+    progress: Callable[[str], None] | None = None,
+) -> Iterator[tuple[Window, NDArray[np.bool_], dict[str, NDArray[np.float32]]]]:
+    """Window by window: which texels hold a surface (h, w), and the maps (h, w, c), gutters of halo width filled.
+
+    progress: called with each map's name before it is made the first time.
+    Raises: InputError when a map's function returns another shape than (h, w, 1 to 4).
+    """
+    planes = Planes.of(*plan.capacity(pieces))
+    for number, window in enumerate(pieces):
+        wide = plan.drawn(window)
+        fine = wide.scaled(plan.along)
+        gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width))
+        held = gbuffer.face >= 0
+        covered = covered_texels(held, plan.along) if plan.along > 1 else held
+        gutter = find_gutter(covered, plan.halo)
+        rows, columns = window.within(wide)
+        maps: dict[str, NDArray[np.float32]] = {}
+        for entry in entries:
+            if progress is not None and number == 0:
+                progress(entry.name)
+            pixels = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
+            background = np.asarray((*entry.background, 1.0)[: pixels.shape[2]], np.float32)
+            maps[entry.name] = gutter.fill(pixels, background)[rows, columns]
+        yield window, covered[rows, columns], maps
+
+
+def computed(entry: BakeMap, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+    """(h, w, c) float32 of one map.  Raises: InputError when its function returns another shape."""
+    pixels = entry.compute(gbuffer, atlas, asset)
+    if pixels.ndim != 3 or pixels.shape[:2] != gbuffer.shape or not 1 <= pixels.shape[2] <= 4:
+        raise InputError(f"map {entry.name}: its function returned {pixels.shape}; expected (*{gbuffer.shape}, 1 to 4)")
+    return np.asarray(pixels, np.float32)
+
+
+def blank_gbuffer(size: int) -> GBuffer:
+    """A G-buffer of size × size texels without a surface and without memory, for maps that need none."""
+    nothing = np.broadcast_to(np.float32(0.0), (size, size))
+    vector = np.broadcast_to(np.float32(0.0), (size, size, 3))
+    face = np.broadcast_to(np.int32(-1), (size, size))
+    return GBuffer(vector, vector, nothing, nothing, face, size=size)
+
+
+def _reduced(pixels: NDArray[np.float32], held: NDArray[np.bool_], along: int, entry: BakeMap) -> NDArray[np.float32]:
+    """Samples → texels."""
+    if along == 1:
+        return pixels
+    if entry.value_range == "whole":
+        return first_covered(pixels, held, along)
+    return averaged(pixels, held, along, unit=entry.units == "unit vector")
+
+
+def _say(message: str, warn: Callable[[str], None] | None) -> None:
+    if warn is None:
+        warnings.warn(message, SoftwareWarning, stacklevel=4)
+    else:
+        warn(message)
