@@ -15,6 +15,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -24,9 +25,9 @@ from flexpara.runtime.errors import FlexparaError
 from flexpara.runtime.meshfile import load_asset
 from flexpara.runtime.metrics import measure
 
-from .paper_markdown import QUANTITIES, markdown
-from .systems import MODES, MODES_OF, NAMES, Job, Outcome, run
-from .tables import COUNTERPART, coverage, figures_of, load_figures
+from .paper_markdown import QUANTITIES, markdown, name_of
+from .systems import ABLATIONS, MODES, MODES_OF, NAMES, Job, Outcome, run
+from .tables import coverage, figures_of, load_figures, measures
 from .unwrap import ROOT, SUFFIXES, header
 
 if TYPE_CHECKING:
@@ -40,13 +41,16 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 PACKAGES = {"libigl": "igl"}
 """Distribution → module, beyond those that `header` lists."""
+GIVEN = ("preset", "charts", "seed", "steps", "width", "precision")
+"""Options of flexpara that go to it as they are."""
 DEVICE = "import torch; print(torch.cuda.get_device_name() if torch.cuda.is_available() else 'cpu')"
 
 
 def row_of(job: Job, asset: Asset, outcome: Outcome) -> Row:
     """One row: who did what to which mesh, how it ended, and where it is done its metrics, seconds and report."""
     row: Row = {"mesh": asset.stem, "faces": len(asset.faces), "mode": job.mode, "system": job.system}
-    row |= {"preset": job.preset if job.system == "flexpara" else None, "status": outcome.status, "why": outcome.why}
+    row |= {"preset": job.preset if job.system == "flexpara" else None, "ablation": job.ablation}
+    row |= {"status": outcome.status, "why": outcome.why}
     if outcome.answer is None:
         return row
     corner_uv, seconds, report = outcome.answer
@@ -59,33 +63,44 @@ def row_of(job: Job, asset: Asset, outcome: Outcome) -> Row:
     return row | {"metrics": metrics, "seconds": seconds, "raw": raw, "report": report}
 
 
+def jobs_of(mode: str, arguments: argparse.Namespace) -> list[Job]:
+    """What was asked for in a mode: flexpara, its ablations, then the others."""
+    given = {name: getattr(arguments, name) for name in GIVEN}
+    python = {"smart-uv": str(arguments.blender_python)}
+    asked = [name for name in NAMES if name in arguments.systems and mode in MODES_OF[name]]
+    jobs = [Job(name, mode, **given, python=python.get(name, sys.executable)) for name in asked]
+    ablations = [name for name in arguments.ablations if ABLATIONS[name] == mode and "flexpara" in asked]
+    return [*jobs[:1], *(Job("flexpara", mode, **given, ablation=name) for name in ablations), *jobs[1:]]
+
+
 def outcomes_of(asset: Asset, arguments: argparse.Namespace) -> Iterator[tuple[Job, Outcome]]:
-    """Each job that was asked for, by mode and system, as soon as it has ended; flexpara before slim."""
-    asked = [name for name in NAMES if name in arguments.systems]
-    order = asked if "slim" not in asked or "flexpara" in asked else ["flexpara", *asked]
+    """Each job that was asked for, as soon as it has ended; slim alone has flexpara run first, for its seams."""
     for mode in arguments.modes:
+        jobs = jobs_of(mode, arguments)
+        systems = {job.system for job in jobs}
+        unasked = [replace(jobs[0], system="flexpara")] if "slim" in systems and "flexpara" not in systems else []
         seams: NDArray[np.float64] | None = None
-        for name in (name for name in order if mode in MODES_OF[name]):
-            python = str(arguments.blender_python) if name == "smart-uv" else sys.executable
-            job = Job(name, mode, arguments.preset, arguments.charts, arguments.steps, arguments.seed, python)
+        for job in [*unasked, *jobs]:
             with tempfile.TemporaryDirectory() as folder:
                 outcome = run(job, asset.surface, arguments.budget, Path(folder), seams)
-            if name == "flexpara" and outcome.answer is not None:
+            if job.system == "flexpara" and not job.ablation and outcome.answer is not None:
                 seams = outcome.answer.corner_uv
-            if name in asked:
+            if job not in unasked:
                 yield job, outcome
 
 
 def with_ratios(rows: list[Row]) -> list[Row]:
-    """The rows, and in each that is done its isometric mean over xatlas' on the same mesh: free of normalisation."""
+    """The rows, and in each that is done its isometric mean over xatlas' in the same table: free of normalisation."""
     done = [row for row in rows if row["status"] == "done"]
-    xatlas = {row["mesh"]: row["metrics"]["isometric_mean"] for row in done if row["system"] == "xatlas"}
-    ratio = {
-        id(row): row["metrics"]["isometric_mean"] / max(xatlas[row["mesh"]], 1e-12)
-        for row in done
-        if row["mesh"] in xatlas
-    }
-    return [row | {"isometric_ratio": ratio.get(id(row))} for row in rows]
+    xatlas = {(row["mesh"], row["mode"]): row for row in done if row["system"] == "xatlas"}
+
+    def ratio(row: Row) -> float | None:
+        reference = xatlas.get((row["mesh"], row["mode"]))
+        if reference is None or row["status"] != "done":
+            return None
+        return row["metrics"]["isometric_mean"] / max(reference["metrics"]["isometric_mean"], 1e-12)
+
+    return [row | {"isometric_ratio": ratio(row)} for row in rows]
 
 
 def comparisons(rows: list[Row]) -> list[Row]:
@@ -93,11 +108,12 @@ def comparisons(rows: list[Row]) -> list[Row]:
     found, figures = list[Row](), load_figures()
     for row in (row for row in rows if row["status"] == "done"):
         for item in figures_of(figures, row["mesh"], row["mode"]):
-            if COUNTERPART.get(item.system) != row["system"]:
+            if not measures(row, item):
                 continue
             quantity = QUANTITIES[item.quantity]
             same = {"table": item.table, "label": item.label, "model": item.model, "mode": item.mode}
-            same |= {"paper_system": item.system, "system": row["system"], "quantity": item.quantity}
+            same |= {"paper_system": item.system, "system": row["system"], "ablation": row["ablation"]}
+            same["quantity"] = item.quantity
             found.append(same | {"paper": item.value, "measured": quantity.of(row), "comparable": quantity.comparable})
     return found
 
@@ -110,7 +126,7 @@ def about(arguments: argparse.Namespace) -> Row:
     if importlib.util.find_spec("torch"):
         done = subprocess.run([sys.executable, "-c", DEVICE], cwd=ROOT, capture_output=True, text=True, check=True)
         device = done.stdout.strip()
-    names = ("preset", "charts", "steps", "seed", "budget", "modes", "systems")
+    names = (*GIVEN, "budget", "modes", "systems", "ablations")
     return facts | {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "device": device,
@@ -155,7 +171,12 @@ def with_common_options(parser: argparse.ArgumentParser) -> argparse.ArgumentPar
     parser.add_argument("--preset", default="fast", help="flexpara's preset: fast or paper")
     parser.add_argument("--charts", type=int, default=8)
     parser.add_argument("--steps", type=int, help="flexpara's training steps, instead of the preset's")
+    parser.add_argument("--width", type=int, help="channels of preset paper's hidden layers, instead of the paper's")
+    parser.add_argument("--precision", default="float32", help="of preset paper: float32 or bfloat16")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--ablations", type=lambda text: words(text, tuple(ABLATIONS)), default=(), help=",".join(ABLATIONS)
+    )
     parser.add_argument("--budget", type=positive, default=600.0, help="wall seconds a system may take on one mesh")
     parser.add_argument(
         "--blender-python", type=Path, default=Path(sys.executable), help="a Python that has bpy, for smart-uv"
@@ -205,7 +226,7 @@ def main(argv: list[str] | None = None) -> int:
         for job, outcome in outcomes_of(asset, arguments):
             rows.append(row := row_of(job, asset, outcome))
             ended = f"{row['seconds']:.1f} s" if row["status"] == "done" else f"{row['status']}: {row['why']}"
-            print(f"{row['mesh']} · {row['mode']} · {row['system']} · {ended}", file=sys.stderr, flush=True)
+            print(f"{row['mesh']} · {row['mode']} · {name_of(row)} · {ended}", file=sys.stderr, flush=True)
             if arguments.json:
                 write_json(arguments.json, facts, with_ratios(rows))
     print(markdown(facts, with_ratios(rows)))

@@ -70,12 +70,13 @@ QUANTITIES = {
         "without the seams it was given. Paper: “optimization time” on one RTX 3090, slim without the seams made by "
         "hand.",
     ),
-    "hours": Quantity("seconds", "hours", "{:.2f}", 3600.0, True, "as seconds."),
 }  # fmt: skip
 COLUMNS = ("conformality", "isometric", "equiareal", "charts", "seam_length", "seconds")
 PAPER_NAMES = {
     "ours": "FlexPara", "optcuts": "OptCuts", "slim": "SLIM, seams by hand", "nuvo": "Nuvo", "xatlas": "xatlas",
-    "smart-uv": "Smart UV", "fbcp-pc": "FBCP-PC",
+    "smart-uv": "Smart UV", "fbcp-pc": "FBCP-PC", "without-tdl": "FlexPara, no TDL", "without-ddl": "FlexPara, no DDL",
+    "without-upper-branch": "FlexPara, no upper branch", "without-lower-branch": "FlexPara, no lower branch",
+    "with-bi-directional": "FlexPara, bi-directional", "with-ddl": "FlexPara, with DDL",
 }  # fmt: skip
 RAW_NAMES = {
     name: (name, quantity.metric, quantity.metric.removesuffix("_mean")) for name, quantity in QUANTITIES.items()
@@ -118,16 +119,23 @@ def table(mode: str, rows: list[Row]) -> str:
         for row in (row for row in rows if row["mesh"] == mesh):
             lines += [joined(cells) for cells in measured_cells(row)]
         theirs = figures_of(figures, mesh, mode)
-        lines += [joined(paper_cells(mesh, system, theirs)) for system in dict.fromkeys(item.system for item in theirs)]
+        for group in paper_groups(theirs):
+            lines.append(joined(paper_cells(mesh, group, theirs)))
         lines += (
             [] if theirs else [joined([mesh, "paper", *[""] * (len(titles) + 2), "has no such model in this mode"])]
         )
     return "\n".join(lines)
 
 
+def name_of(row: Row) -> str:
+    """System of a row, for flexpara with preset and ablation."""
+    words = [row["system"], *([row["preset"]] if row["system"] == "flexpara" else []), row["ablation"]]
+    return " ".join(word for word in words if word)
+
+
 def measured_cells(row: Row) -> list[list[str]]:
     """The line of a run, and where the run gives the paper's raw figures a second one."""
-    name = f"**flexpara** {row['preset']}" if row["system"] == "flexpara" else row["system"]
+    name = name_of(row).replace("flexpara", "**flexpara**")
     if row["status"] != "done":
         return [[row["mesh"], name, *[""] * (len(COLUMNS) + 3), f"{row['status']}: {row['why']}"]]
     values = [QUANTITIES[column].text(QUANTITIES[column].of(row)) for column in COLUMNS]
@@ -151,14 +159,23 @@ def raw_value(raw: Row, quantity: str) -> float | None:
     return next(found, None)
 
 
-def paper_cells(mesh: str, system: str, figures: list[Figure]) -> list[str]:
-    """The line of a system of the paper."""
-    value = {item.quantity: item.value for item in figures if item.system == system}
+def paper_groups(figures: list[Figure]) -> list[list[Figure]]:
+    """One group a line: a system of the paper, its ablation studies apart (they give the full method other figures)."""
+    groups: dict[tuple[str, bool], list[Figure]] = {}
+    for item in figures:
+        groups.setdefault((item.system, "ablation" in item.label), []).append(item)
+    return list(groups.values())
+
+
+def paper_cells(mesh: str, group: list[Figure], figures: list[Figure]) -> list[str]:
+    """The line of a system of the paper; figures: all of that mesh and mode, for xatlas' isometric."""
+    value = {item.quantity: item.value for item in group}
     values = [QUANTITIES[column].text(value.get(column)) for column in COLUMNS]
-    xatlas = next((item.value for item in figures if (item.system, item.quantity) == ("xatlas", "isometric")), None)
-    values.insert(2, f"{value['isometric'] / xatlas:.2f}" if xatlas and "isometric" in value else "")
-    tables = ", ".join(dict.fromkeys(item.table for item in figures if item.system == system))
-    return [mesh, f"paper: {PAPER_NAMES[system]}", *values, "", "", tables]
+    xatlas = {item.table: item.value for item in figures if (item.system, item.quantity) == ("xatlas", "isometric")}
+    ours = next((item for item in group if item.quantity == "isometric" and item.table in xatlas), None)
+    values.insert(2, "" if ours is None else f"{ours.value / xatlas[ours.table]:.2f}")
+    tables = ", ".join(dict.fromkeys(item.table for item in group))
+    return [mesh, f"paper: {PAPER_NAMES[group[0].system]}", *values, "", "", tables]
 
 
 def notes() -> str:

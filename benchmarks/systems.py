@@ -8,7 +8,6 @@ libraries.  slim gets flexpara's finished seams, as the paper's SLIM gets seams 
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import signal
@@ -37,14 +36,24 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 GLOBAL, MULTI_CHART = "global", "multi-chart"
 MODES = (MULTI_CHART, GLOBAL)
+ABLATIONS = {
+    "no-triangle": GLOBAL,
+    "no-differential": GLOBAL,
+    "no-upper": GLOBAL,
+    "no-lower": GLOBAL,
+    "bidirectional": MULTI_CHART,
+    "chart-differential": MULTI_CHART,
+}
+"""flexpara's ablations and the mode that each belongs to."""
 SLIM_ITERATIONS = 20
 """Those of libigl's own SLIM tutorial (number 205); `slim_solve` has no default."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is asked of a system.  preset, charts, steps (None: the preset's) and seed are read by flexpara alone.
+    """What is asked of a system; all but its name and mode is read by flexpara alone, as `flexpara.unwrap` means it.
 
+    ablation: one of its ablations, or "".
     python: the interpreter that runs it, this one by default; smart-uv alone can do with one that lacks flexpara.
     """
 
@@ -52,8 +61,11 @@ class Job:
     mode: str = MULTI_CHART
     preset: str = "fast"
     charts: int = 8
-    steps: int | None = None
     seed: int = 0
+    steps: int | None = None
+    width: int | None = None
+    precision: str = "float32"
+    ablation: str = ""
     python: str = sys.executable
 
 
@@ -79,22 +91,13 @@ class Outcome:
 
 
 def by_flexpara(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -> Answer:
-    """`flexpara.unwrap` with its defaults, but for what the job says.  seams: not read.
-
-    Raises:
-        InputError: this flexpara has no such mode, preset or steps.
-        FlexparaError: as `flexpara.unwrap`.
-    """
+    """`flexpara.unwrap` with its defaults, but for what the job says.  seams: not read.  Raises as it does."""
     del seams
     import flexpara
 
-    known = inspect.signature(flexpara.unwrap).parameters
-    wanted: dict[str, Any] = {"charts": job.charts, "preset": job.preset, "seed": job.seed}
-    wanted |= {} if job.steps is None else {"steps": job.steps}
-    wanted |= {"mode": job.mode} if "mode" in known or job.mode != MULTI_CHART else {}
-    unknown = [f"{name}={value!r}" for name, value in wanted.items() if name not in known]
-    if unknown:
-        raise InputError(f"flexpara {flexpara.__version__} has no {', '.join(unknown)}; leave that out")
+    wanted: dict[str, Any] = {"charts": job.charts, "seed": job.seed, "preset": job.preset, "mode": job.mode}
+    wanted |= {"steps": job.steps, "width": job.width, "precision": job.precision}
+    wanted |= {"ablation": (job.ablation,) if job.ablation else ()}
     start = time.perf_counter()
     result = flexpara.unwrap((surface.vertices, surface.faces), **wanted)
     seconds = time.perf_counter() - start

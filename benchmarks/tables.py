@@ -16,8 +16,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 TABLES = Path(__file__).with_name("paper_tables.json")
-COUNTERPART = {"ours": "flexpara", "xatlas": "xatlas", "smart-uv": "smart-uv", "slim": "slim"}
-"""Systems of the paper → systems of this harness."""
+COUNTERPART = {
+    "ours": ("flexpara", ""),
+    "xatlas": ("xatlas", ""),
+    "smart-uv": ("smart-uv", ""),
+    "slim": ("slim", ""),
+    "without-tdl": ("flexpara", "no-triangle"),
+    "without-ddl": ("flexpara", "no-differential"),
+    "without-upper-branch": ("flexpara", "no-upper"),
+    "without-lower-branch": ("flexpara", "no-lower"),
+    "with-bi-directional": ("flexpara", "bidirectional"),
+    "with-ddl": ("flexpara", "chart-differential"),
+}
+"""Systems of the paper → (system, ablation) of this harness."""
 NOT_HERE = {
     "optcuts": "OptCuts is a C++ program, no system of this harness",
     "nuvo": "Nuvo is no system of this harness",
@@ -66,37 +77,34 @@ def same_model(one: str, other: str) -> bool:
 
 
 def figures_of(figures: Iterable[Figure], model: str, mode: str) -> list[Figure]:
-    """The paper's figures of a model in a mode, ablations left out."""
-    chosen = (item for item in figures if same_model(item.model, model) and item.mode == mode)
-    return [item for item in chosen if not is_ablation(item)]
+    """The paper's figures of a model in a mode."""
+    return [item for item in figures if same_model(item.model, model) and item.mode == mode]
 
 
-def is_ablation(figure: Figure) -> bool:
-    """Whether the figure belongs to an ablation study."""
-    return "ablation" in figure.label
+def measures(row: dict[str, Any], figure: Figure) -> bool:
+    """Whether the row of a run is of the figure's model, mode, system and ablation."""
+    same = same_model(row["mesh"], figure.model) and row["mode"] == figure.mode
+    return same and (row["system"], row["ablation"]) == COUNTERPART.get(figure.system)
 
 
-def why_not_run(figure: Figure, runs: Iterable[dict[str, Any]]) -> str:
+def why_not_run(figure: Figure, runs: list[dict[str, Any]]) -> str:
     """Why no run of the harness has measured what this figure says; "" where one has.
 
     Args:
         figure: one of the paper's.
-        runs: rows with mesh, mode, system, status and why, as the harness makes them.
+        runs: rows with mesh, mode, system, ablation, status and why, as the harness makes them.
     """
-    if is_ablation(figure):
-        return "ablations are not part of this harness"
     if figure.kind == "points":
         return "point clouds are not part of this harness"
     if figure.system in NOT_HERE:
         return NOT_HERE[figure.system]
-    here = [row for row in runs if same_model(row["mesh"], figure.model)]
-    if not here:
+    if not any(same_model(row["mesh"], figure.model) for row in runs):
         return "no mesh of that name was given"
-    system = COUNTERPART[figure.system]
-    row = next((row for row in here if row["system"] == system and row["mode"] == figure.mode), None)
+    name = " ".join(word for word in COUNTERPART[figure.system] if word)
+    row = next((row for row in runs if measures(row, figure)), None)
     if row is None:
-        return f"{system}, {figure.mode}, was not asked for"
-    return "" if row["status"] == "done" else f"{system}, {figure.mode}, {row['status']}: {row['why']}"
+        return f"{name}, {figure.mode}, was not asked for"
+    return "" if row["status"] == "done" else f"{name}, {figure.mode}, {row['status']}: {row['why']}"
 
 
 def coverage(figures: Iterable[Figure], runs: list[dict[str, Any]]) -> dict[str, Counter[str]]:

@@ -80,6 +80,30 @@ def test_what_is_asked_for_reaches_flexpara(monkeypatch: pytest.MonkeyPatch, tmp
     rows_with(run, monkeypatch, tmp_path, "--preset", "paper", "--steps", "7", "--charts", "3", "--seed", "5")
     job = run.jobs[0][0]
     assert (job.preset, job.steps, job.charts, job.seed) == ("paper", 7, 3, 5)
+    rows_with(run, monkeypatch, tmp_path, "--precision", "bfloat16", "--width", "64")
+    assert (run.jobs[-1][0].precision, run.jobs[-1][0].width) == ("bfloat16", 64)
+
+
+def test_an_ablation_runs_in_its_own_mode_and_gives_slim_no_seams(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    run = FakeRun(slim="not run")
+    rows = rows_with(run, monkeypatch, tmp_path, "--systems", "slim,flexpara", "--ablations", "no-upper,bidirectional")
+    order = [(job.mode, job.system, job.ablation) for job, _ in run.jobs]
+    assert order == [
+        ("multi-chart", "flexpara", ""), ("multi-chart", "flexpara", "bidirectional"), ("multi-chart", "slim", ""),
+        ("global", "flexpara", ""), ("global", "flexpara", "no-upper"), ("global", "slim", ""),
+    ]  # fmt: skip
+    assert any("| **flexpara** fast no-upper |" in line for line in table("global", rows).splitlines())
+
+
+def test_the_papers_ablations_have_lines_of_their_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    rows = [row | {"mesh": "bird"} for row in rows_with(FakeRun(), monkeypatch, tmp_path, "--modes", "global")]
+    lines = [line for line in table("global", rows).splitlines() if "paper: FlexPara" in line]
+    assert len(lines) == 1 + 5
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
+    assert [row[2] for row in cells] == ["0.0371", "0.0250", "0.0340", "0.2800", "0.0270", "0.1290"]
+    assert {row[-1] for row in cells[1:]} == {"Table 6"}
 
 
 def test_systems_without_a_global_mode_have_no_row_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -96,7 +120,7 @@ def test_the_papers_figures_stand_beside_those_of_the_same_system(
     assert found["global", "flexpara", "conformality"]["paper"] == 0.0634
     assert found["multi-chart", "xatlas", "charts"] | {"label": ""} == {
         "table": "Table 4", "label": "", "model": "Bunny", "mode": "multi-chart", "paper_system": "xatlas",
-        "system": "xatlas", "quantity": "charts", "paper": 47.0, "measured": 4, "comparable": True,
+        "system": "xatlas", "ablation": "", "quantity": "charts", "paper": 47.0, "measured": 4, "comparable": True,
     }  # fmt: skip
     assert not found["multi-chart", "flexpara", "seam_length"]["comparable"]
     assert len(found) == 2 + 2 + 3 * 4
@@ -154,6 +178,7 @@ def test_only_what_the_paper_defines_is_called_comparable() -> None:
         (("--systems", "xatlas,optcuts"), "expected some of flexpara"),
         (("--systems", ","), "expected some of flexpara"),
         (("--modes", "local"), "expected some of multi-chart,global"),
+        (("--ablations", "no-luck"), "expected some of no-triangle"),
         (("--budget", "0"), "more than 0 seconds"),
     ],
 )
