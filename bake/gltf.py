@@ -13,18 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..runtime.errors import MissingDependencyError, ShapeError
-from ..runtime.topology import edge_table
+from ..runtime.errors import ShapeError
 from .color import linear_from_srgb
-from .images import Texture, encode_png
+from .glbbuffer import Buffer, gl
+from .gltfmaterial import add_material
 from .tangents import unit, vertex_tangents
-
-try:
-    import pygltflib as gl
-except ImportError as error:
-    raise MissingDependencyError(
-        f"pygltflib cannot be imported ({error}), GLB files are written with it: pip install 'flexpara[bake]'"
-    ) from error
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,19 +26,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
+    from .images import Texture
 
-BASE_COLOR_MAPS = ("base-color", "vertex-color", "uv-checker", "chart")
-"""The first of these that was baked becomes the base colour."""
-ROUGHNESS = 0.8
 FLOAT32_LOSS = 1e-6
 """Rounding, as a part of the bounding box's diagonal, from which on positions are written about their centre."""
-COMPONENT_TYPES = {
-    "float32": gl.FLOAT,
-    "uint8": gl.UNSIGNED_BYTE,
-    "uint16": gl.UNSIGNED_SHORT,
-    "uint32": gl.UNSIGNED_INT,
-}
-ACCESSOR_TYPES = {1: gl.SCALAR, 2: gl.VEC2, 3: gl.VEC3, 4: gl.VEC4}
 
 
 def write_glb(
@@ -65,9 +49,9 @@ def glb_bytes(
 ) -> bytes:
     """The bytes of a .glb file; same arguments, same bytes.
 
-    Base colour is the first baked map of `BASE_COLOR_MAPS`; the map `normal` becomes the normal texture (green turned
-    up if it was baked for DirectX) and brings TANGENT along.  TEXCOORD_1 is the source's own uv.  Vertex colours are
-    COLOR_0 without a base colour texture and _COLOR_0 beside one, since COLOR_0 would be multiplied into the texture.
+    What the maps become is said in gltfmaterial.py; the map `normal` brings TANGENT along.  TEXCOORD_1 is the source's
+    own uv.  Vertex colours are COLOR_0 without a base colour texture and _COLOR_0 beside one, since COLOR_0 would be
+    multiplied into the texture.
 
     Args:
         atlas: what is written.
@@ -79,47 +63,16 @@ def glb_bytes(
     Raises: ShapeError when the atlas' arrays do not fit each other; EncodingError for textures PNG cannot hold.
     """
     _check(atlas, asset)
-    buffer = _Buffer()
+    buffer = Buffer()
     document = gl.GLTF2(asset=gl.Asset(version="2.0", generator=_generator()))
     if metadata:
         document.asset.extras = {"flexpara": json.loads(json.dumps(metadata))}
-    material = _add_material(document, buffer, asset, textures)
+    material = add_material(document, buffer, asset, textures)
     _add_mesh(document, buffer, atlas, asset, material)
     document.accessors, document.bufferViews = buffer.accessors, buffer.views
     document.buffers = [gl.Buffer(byteLength=len(buffer.data))]
     document.set_binary_blob(bytes(buffer.data))
     return b"".join(document.save_to_bytes())
-
-
-class _Buffer:
-    """The one binary buffer while it grows: views aligned to four bytes, accessors over them."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[gl.BufferView] = []
-        self.accessors: list[gl.Accessor] = []
-
-    def view(self, data: bytes, target: int | None = None) -> int:
-        """Append bytes; the number of their view."""
-        self.views.append(gl.BufferView(buffer=0, byteOffset=len(self.data), byteLength=len(data), target=target))
-        self.data += data + bytes(-len(data) % 4)
-        return len(self.views) - 1
-
-    def accessor(self, array: NDArray[np.generic], target: int, *, bounds: bool = False) -> int:
-        """Append an array (count,) or (count, c); the number of its accessor.  Integers of c > 1 are normalized."""
-        columns = array.shape[1] if array.ndim == 2 else 1
-        self.accessors.append(
-            gl.Accessor(
-                bufferView=self.view(np.ascontiguousarray(array).tobytes(), target),
-                componentType=COMPONENT_TYPES[array.dtype.name],
-                count=len(array),
-                type=ACCESSOR_TYPES[columns],
-                normalized=True if array.dtype.kind == "u" and columns > 1 else None,
-                min=array.min(axis=0).tolist() if bounds else None,
-                max=array.max(axis=0).tolist() if bounds else None,
-            )
-        )
-        return len(self.accessors) - 1
 
 
 def _check(atlas: Atlas, asset: Asset) -> None:
@@ -144,7 +97,7 @@ def _generator() -> str:
         return "flexpara"
 
 
-def _add_mesh(document: gl.GLTF2, buffer: _Buffer, atlas: Atlas, asset: Asset, material: gl.Material) -> None:
+def _add_mesh(document: gl.GLTF2, buffer: Buffer, atlas: Atlas, asset: Asset, material: gl.Material) -> None:
     """One primitive in one node in one scene."""
     centre = _centre(atlas.positions)
     surface = material.pbrMetallicRoughness
@@ -209,41 +162,3 @@ def _indices(atlas: Atlas) -> NDArray[np.generic]:
     """(3 f,) uint16 where that is enough (65535 itself is reserved), else uint32."""
     small = len(atlas.positions) <= 65535
     return atlas.faces.reshape(-1).astype(np.uint16 if small else np.uint32)
-
-
-def _add_material(document: gl.GLTF2, buffer: _Buffer, asset: Asset, textures: Mapping[str, Texture]) -> gl.Material:
-    """Material 0 with its images, textures and sampler."""
-    name = next((name for name in BASE_COLOR_MAPS if name in textures), None)
-    single = asset.materials[0] if len(asset.materials) == 1 else None
-    factor = list(single.base_color_factor) if single is not None and name is None else [1.0, 1.0, 1.0, 1.0]
-    surface = gl.PbrMetallicRoughness(baseColorFactor=factor, metallicFactor=0.0, roughnessFactor=ROUGHNESS)
-    opened = bool((edge_table(asset.surface.faces).edge_count == 1).any())
-    label = single.name if single is not None else asset.stem
-    material = gl.Material(name=label, pbrMetallicRoughness=surface, doubleSided=opened, alphaCutoff=None)
-    if name is not None:
-        surface.baseColorTexture = gl.TextureInfo(index=_add_image(document, buffer, name, textures[name]))
-    if "normal" in textures:
-        image = _add_image(document, buffer, "normal", _green_up(textures["normal"]))
-        material.normalTexture = gl.NormalMaterialTexture(index=image)
-    document.materials = [material]
-    return material
-
-
-def _add_image(document: gl.GLTF2, buffer: _Buffer, name: str, texture: Texture) -> int:
-    """Embed an 8-bit PNG; the number of its texture.  One sampler serves all: trilinear, clamped to the edge."""
-    if not document.samplers:
-        sampler = gl.Sampler(magFilter=gl.LINEAR, minFilter=gl.LINEAR_MIPMAP_LINEAR)
-        sampler.wrapS = sampler.wrapT = gl.CLAMP_TO_EDGE
-        document.samplers = [sampler]
-    view = buffer.view(encode_png(texture, bits=8))
-    document.images.append(gl.Image(name=name, mimeType="image/png", bufferView=view))
-    document.textures.append(gl.Texture(name=name, sampler=0, source=len(document.images) - 1))
-    return len(document.textures) - 1
-
-
-def _green_up(texture: Texture) -> Texture:
-    """A tangent-space normal map as glTF wants it, whatever it was baked for."""
-    if not texture.metadata.get("space", "").endswith("Y down"):
-        return texture
-    pixels = texture.pixels * np.array([1.0, -1.0, 1.0], np.float32)
-    return Texture(pixels, texture.encoding, texture.bits, texture.file_type, texture.dither, texture.metadata)

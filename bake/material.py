@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..runtime.materials import PbrMaterial, picture_of
+from ..runtime.materials import PbrMaterial, picture_of, used_materials
 from ..runtime.mesh import Material
 from .resample import FootprintSampler, SourceTexture, linear_colors, texel_axes
 from .tangents import mikk_tangents
@@ -105,6 +105,7 @@ def base_color_map() -> Compute:
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
         colors = None if asset.colors is None else linear_colors(asset.colors)
         corners = atlas.source_vertex[atlas.faces]
+        blended = any(isinstance(entry, PbrMaterial) and entry.alpha_mode == "BLEND" for entry in used_materials(asset))
 
         def shade(
             material: Material, values: NDArray[np.float32] | None, texels: NDArray[np.int64]
@@ -112,19 +113,22 @@ def base_color_map() -> Compute:
             result = np.ones((len(texels), 4), np.float32) if values is None else values
             if colors is not None and (values is None or isinstance(material, PbrMaterial)):
                 result = result * gbuffer.interpolate(colors, corners, texels)
-            return with_alpha_mode(result * np.asarray(material.base_color_factor, np.float32), material)
+            result = result * np.asarray(material.base_color_factor, np.float32)
+            return with_alpha_mode(result, material, hard=blended)
 
         return ready(atlas, asset, "base-color", gbuffer.side).shaded(gbuffer, 4, shade)
 
     return compute
 
 
-def with_alpha_mode(color: NDArray[np.float32], material: Material) -> NDArray[np.float32]:
-    """(t, 4) RGBA as its material reads it: alpha 1 if opaque, with the cut at ½ if masked, else as it is."""
+def with_alpha_mode(color: NDArray[np.float32], material: Material, *, hard: bool) -> NDArray[np.float32]:
+    """(t, 4) RGBA as its material reads it: alpha 1 if opaque, its cut at ½ if masked (hard: cut), else as it is."""
     if not isinstance(material, PbrMaterial) or material.alpha_mode == "BLEND":
         return color
     if material.alpha_mode == "OPAQUE":
         color[:, 3] = 1.0
+    elif hard:
+        color[:, 3] = color[:, 3] >= material.alpha_cutoff
     elif material.alpha_cutoff > 0.0:
         color[:, 3] = np.clip(color[:, 3] * (0.5 / material.alpha_cutoff), 0.0, 1.0)
     return color

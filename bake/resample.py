@@ -5,8 +5,9 @@ face and place, the old uv follow.  uv are v up, row 0 of a picture is its top.
 
 A new texel is a parallelogram in the old picture, the same for all texels of a face.  It is averaged over a grid of up
 to `MOST` × `MOST` points with spacing of at most one source texel, on a smaller picture where that is not enough; where
-the new texel is the smaller one, one bilinear look-up is all.  Colours are averaged in linear light, normals as
-vectors.
+the new texel is the smaller one, it takes the bilinear value at its centre less up to `SHARPEN` times the second
+differences to its four neighbours: a reader's bilinear filter blurs by about as much.  Colours are averaged in linear
+light, normals as vectors.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 MOST = 8
 """Points along each side of a texel's footprint."""
+SHARPEN = 1.0 / 8.0
+"""1/12 is the least-squares answer for a parabola; 1/8 measured best on pictures, whose bilinear kinks are sharper."""
 Decoding = Literal["color", "data", "signed"]
 
 
@@ -103,6 +106,7 @@ class FootprintSampler:
         self.texture, self.place = texture, place
         self.steps = axes @ place[:, :2].T
         self.counts, self.levels = footprint_grids(self.steps * np.array([width, height], np.float64))
+        self.gain = SHARPEN * np.clip(2.0 * (1.0 - self._lengths(height, width)), 0.0, 1.0).astype(np.float32)
         self.kind = np.log2(self.counts).astype(np.int64) @ np.array([1, 8]) + 64 * self.levels
 
     def make_levels(self, faces: NDArray[np.int64]) -> None:
@@ -116,14 +120,43 @@ class FootprintSampler:
         result = np.zeros((len(uv), 4), np.float32)
         for key in np.unique(kind):
             chosen = np.flatnonzero(kind == key)
-            step, (across, down) = self.steps[face[chosen]], self.counts[face[chosen[0]]]
-            total = np.zeros((len(chosen), 4), np.float32)
-            for right in (np.arange(across) + 0.5) / across - 0.5:
-                for below in (np.arange(down) + 0.5) / down - 0.5:
-                    point = uv[chosen] + right * step[:, 0] + below * step[:, 1]
-                    total += self.texture.sample(point, int(key) // 64)
-            result[chosen] = total / np.float32(across * down)
+            step, grid = self.steps[face[chosen]], self.counts[face[chosen[0]]]
+            place = uv[chosen]
+            if grid.max() == 1 and self.texture.picture.smooth:
+                result[chosen] = self._sharpened(place, step, self.gain[face[chosen], None])
+            else:
+                result[chosen] = self._averaged(place, step, grid, int(key) // 64)
         return result
+
+    def _averaged(
+        self, uv: NDArray[np.float64], step: NDArray[np.float64], grid: NDArray[np.int64], level: int
+    ) -> NDArray[np.float32]:
+        """(t, 4) means of grid[0] × grid[1] points of the parallelograms spanned by step (t, 2, 2)."""
+        total = np.zeros((len(uv), 4), np.float32)
+        for right in (np.arange(grid[0]) + 0.5) / grid[0] - 0.5:
+            for below in (np.arange(grid[1]) + 0.5) / grid[1] - 0.5:
+                total += self.texture.sample(uv + right * step[:, 0] + below * step[:, 1], level)
+        return total / np.float32(grid.prod())
+
+    def _sharpened(
+        self, uv: NDArray[np.float64], step: NDArray[np.float64], gain: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """(t, 4) values whose bilinear interpolation is near the picture everywhere, not only at texel centres.
+
+        gain: (t, 1), 0 where texels are as large as those of the picture: what is copied texel by texel stays as it is.
+        """
+        total = self.texture.sample(uv, 0)
+        if not gain.any():
+            return total
+        total *= 1.0 + 4.0 * gain
+        for axis in (0, 1):
+            for side in (-1.0, 1.0):
+                total -= gain * self.texture.sample(uv + side * step[:, axis], 0)
+        return total
+
+    def _lengths(self, height: int, width: int) -> NDArray[np.float64]:
+        """(f,) longer side of the footprints, in texels of the picture."""
+        return np.linalg.norm(self.steps * np.array([width, height], np.float64), axis=2).max(axis=1)
 
 
 def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: int) -> NDArray[np.float64]:

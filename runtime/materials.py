@@ -1,7 +1,7 @@
 """Materials with all their textures, and the pictures beside a mesh file: OBJ libraries, files of one folder only.
 
-Words are those of glTF 2.0 (metallic-roughness model): a slot is what a texture is for.  Pictures are (h, w, 4) uint8 as
-stored, row 0 = top: sRGB in the slots base-color and emissive, data in the others.  Factors are linear.
+Words are those of glTF 2.0 (metallic-roughness model): a slot is what a texture is for.  Pictures are (h, w, 4) uint8
+as stored, row 0 = top: sRGB in the slots base-color and emissive, data in the others.  Factors are linear.
 A mesh file may come from anyone: names in it reach no file outside its own folder, and no network.
 """
 
@@ -84,7 +84,7 @@ def source_maps(asset: Asset) -> tuple[str, ...]:
     base-color where there is colour, orm where both occlusion and a metallic-roughness that varies are there, else the
     one that is, emissive where something glows.  What is the same all over needs no map: it stays a factor.
     """
-    used = _used_materials(asset)
+    used = used_materials(asset)
     has = {slot: asset.uv is not None and any(picture_of(entry, slot) for entry in used) for slot in SLOTS}
     finishes = {(entry.metallic, entry.roughness) for entry in used if isinstance(entry, PbrMaterial)}
     finish = has["metallic-roughness"] or len(finishes) > 1
@@ -98,8 +98,8 @@ def source_maps(asset: Asset) -> tuple[str, ...]:
     return (*names, *(["emissive"] if has["emissive"] or len(glows) > 1 else []))
 
 
-def _used_materials(asset: Asset) -> list[Material]:
-    """The materials that some face has."""
+def used_materials(asset: Asset) -> list[Material]:
+    """The materials that some face has; the first one where faces do not say."""
     if asset.face_material is None:
         return list(asset.materials[:1])
     return [asset.materials[int(index)] for index in np.unique(asset.face_material)]

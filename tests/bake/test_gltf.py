@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygltflib
@@ -15,10 +16,12 @@ import pytest
 
 from flexpara.bake.baker import bake
 from flexpara.bake.gltf import glb_bytes, write_glb
-from flexpara.bake.images import read_image
+from flexpara.bake.images import quantize, read_image
 from flexpara.bake.tangents import vertex_tangents
 from flexpara.runtime.errors import ShapeError
+from flexpara.runtime.materials import SLOTS, PbrMaterial, Picture
 from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.meshfile import load_asset
 
 Pair = tuple[Atlas, Asset]
 
@@ -239,6 +242,76 @@ def test_the_khronos_validator_has_no_complaint(sphere: Pair, tmp_path: Path, ma
     rich = replace(asset, colors=colors, uv=atlas.uv.astype(np.float64) * 3)
     write_glb(atlas, rich, bake(atlas, rich, maps, size=64), tmp_path / "a.glb", metadata={"charts": 1})
     assert_valid(tmp_path / "a.glb")
+
+
+SURFACE_MAPS = ["base-color", "normal", "orm", "emissive"]
+
+
+def textured_pair(pair: Pair, **changes: Any) -> Pair:
+    """The pair with a material of five textures on the atlas' own uv, repeated three times."""
+    atlas, asset = pair
+    noise = np.random.default_rng(1).integers(0, 256, (8, 8, 4)).astype(np.uint8)
+    pictures: Any = {slot: Picture(noise) for slot in SLOTS}
+    material = PbrMaterial("rich", pictures=pictures, base_color=noise, **{"emissive": (1.0, 0.5, 0.0), **changes})
+    return atlas, replace(asset, uv=atlas.uv.astype(np.float64) * 3, materials=(material,))
+
+
+@pytest.mark.parametrize("maps", [SURFACE_MAPS, ["metallic-roughness", "occlusion"], ["face-id", "distortion"]])
+@pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
+def test_the_validator_accepts_every_texture_and_alpha_mode(
+    sphere: Pair, tmp_path: Path, maps: list[str], mode: Any
+) -> None:
+    pair = textured_pair(sphere, alpha_mode=mode, emissive=(3.0, 0.0, 1.0), double_sided=True)
+    write_glb(*pair, bake(*pair, maps, size=32), tmp_path / "a.glb")
+    assert_valid(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("changes", [{}, {"alpha_mode": "MASK", "alpha_cutoff": 0.3}, {"emissive": (8.0, 1.0, 0.0)}])
+def test_the_validator_accepts_factors_alone(sphere: Pair, tmp_path: Path, changes: dict[str, Any]) -> None:
+    atlas, asset = sphere
+    material = PbrMaterial("bare", (0.5, 0.25, 1.0, 0.5), metallic=0.75, roughness=0.125, **changes)
+    write_glb(atlas, replace(asset, materials=(material,)), {}, tmp_path / "a.glb")
+    assert_valid(tmp_path / "a.glb")
+    (again,) = load_asset(tmp_path / "a.glb").materials
+    for name in ("name", "base_color_factor", "metallic", "roughness", "emissive", *list(changes)):
+        assert getattr(again, name) == pytest.approx(getattr(material, name)), name
+
+
+def test_packed_maps_are_embedded_once(sphere: Pair) -> None:
+    pair = textured_pair(sphere)
+    document = parse(glb_bytes(*pair, bake(*pair, SURFACE_MAPS, size=16)))
+    assert [image.name for image in document.images] == ["base-color", "orm", "normal", "emissive"]
+    material = document.materials[0]
+    assert material.pbrMetallicRoughness is not None
+    assert material.pbrMetallicRoughness.metallicRoughnessTexture is not None
+    assert material.occlusionTexture is not None
+    assert material.pbrMetallicRoughness.metallicRoughnessTexture.index == material.occlusionTexture.index == 1
+    assert (material.pbrMetallicRoughness.metallicFactor, material.pbrMetallicRoughness.roughnessFactor) == (1, 1)
+    assert material.emissiveFactor == [1, 1, 1]
+
+
+def test_emission_beyond_1_takes_the_extension(sphere: Pair) -> None:
+    pair = textured_pair(sphere, emissive=(4.0, 0.0, 0.0))
+    document = parse(glb_bytes(*pair, bake(*pair, ["emissive"], size=16)))
+    assert document.materials[0].extensions == {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}
+    assert document.extensionsUsed == ["KHR_materials_emissive_strength"]
+
+
+def test_what_was_written_is_read_again(sphere: Pair, tmp_path: Path) -> None:
+    """Our reader on our file: every slot, clamped, with the pixels of the maps."""
+    pair = textured_pair(sphere, alpha_mode="BLEND")
+    textures = bake(*pair, SURFACE_MAPS, size=16)
+    write_glb(*pair, textures, tmp_path / "a.glb")
+    (material,) = load_asset(tmp_path / "a.glb").materials
+    assert isinstance(material, PbrMaterial)
+    assert set(material.pictures) == set(SLOTS)
+    assert {picture.wrap for picture in material.pictures.values()} == {("clamp", "clamp")}
+    assert material.alpha_mode == "BLEND"
+    maps = {"base-color": "base-color", "normal": "normal", "occlusion": "orm", "emissive": "emissive"}
+    for slot, name in maps.items():
+        stored = quantize(textures[name], bits=8)
+        found = material.pictures[slot].pixels  # type: ignore[index]
+        np.testing.assert_array_equal(found[..., : stored.shape[2]], stored)
 
 
 def test_degenerate_normals_and_tangents_still_validate(quad: Pair, tmp_path: Path) -> None:
