@@ -31,8 +31,8 @@ class Neighbourhood:
         asked = _finite(queries.detach().float())
         if self._tree is None:
             return _by_blocks(self._points, asked, count)
-        _, index = self._tree.query(asked.numpy(), k=range(1, count + 1), workers=torch.get_num_threads())
-        return torch.from_numpy(index)
+        _, index = self._tree.query(asked.numpy(), k=count, workers=torch.get_num_threads())
+        return torch.from_numpy(index.reshape(len(asked), count))
 
 
 def own_neighbours(points: Tensor, count: int) -> Tensor:
