@@ -83,15 +83,15 @@ def export_onnx(
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
     content = build_model(model, facts, spec)
     points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
-    report = prove_parity(UnwrapGraph(_frozen(model), facts), content, points, spec.parity)
-    _write_whole(path, content)
+    report = prove_parity(UnwrapGraph(frozen_copy(model), facts), content, points, spec.parity)
+    write_whole(path, content)
     return report
 
 
 def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) -> bytes:
     """The ONNX model in memory, checked by onnx, not yet proven equal to the torch model."""
     builder = GraphBuilder()
-    frozen = _frozen(model)
+    frozen = frozen_copy(model)
     _check_shapes(frozen, metadata.patch_count)
     with torch.no_grad():
         _write_graph(builder, trace(frozen), metadata, spec)
@@ -105,7 +105,7 @@ def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) ->
     )
 
 
-def _frozen(model: nn.Module) -> nn.Module:
+def frozen_copy(model: nn.Module) -> nn.Module:
     """A float32 copy on the CPU, in evaluation mode, without gradients."""
     return copy.deepcopy(model).to("cpu", torch.float32).eval().requires_grad_(False)
 
@@ -182,7 +182,7 @@ def _chosen_uv(builder: GraphBuilder, all_uv: str, patch: str, chart: str, metad
     return builder.op("Add", turned, shift)
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write next to the target and rename: the file appears whole or not at all."""
     partial = path.with_name(f".{path.name}.partial")
     try:

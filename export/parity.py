@@ -6,7 +6,7 @@ n points · p patches · Δ difference.  uv in [0, 1]², score in [0, 1].
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import onnxruntime
@@ -17,6 +17,8 @@ from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNot
 from ..runtime.errors import ParityError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas, Frame
@@ -82,20 +84,20 @@ def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32]
     Raises:
         ParityError: names the output, n, max |Δ| and what was allowed; or most points are ties and prove nothing.
     """
-    session = _load(content)
+    session = load_model(content)
     compared = ties = 0
     uv_error = score_error = 0.0
     answered: set[int] = set()
     for n in spec.sizes:
         sample = points[:n]
-        uv, chart, score = _run(session, sample)
+        uv, chart, score = run_model(session, ("uv", "chart", "score"), {"points": sample})
         with torch.no_grad():
             logits, patch_uv = graph.logits_and_uv(torch.from_numpy(sample))
             truth = [tensor.numpy() for tensor in graph.choose(logits, patch_uv)]
         clear = ~_ties(logits.numpy(), spec.tie)
-        uv_error = max(uv_error, _difference("uv", uv, truth[0], clear, n, spec.uv_atol))
-        _difference("chart", chart, truth[1], clear, n, 0.0)
-        score_error = max(score_error, _difference("score", score, truth[2], clear, n, spec.score_atol))
+        uv_error = max(uv_error, largest_difference("uv", uv, truth[0], clear, n, spec.uv_atol))
+        largest_difference("chart", chart, truth[1], clear, n, 0.0)
+        score_error = max(score_error, largest_difference("score", score, truth[2], clear, n, spec.score_atol))
         answered.update(logits.argmax(dim=1)[torch.from_numpy(clear)].tolist())
         compared, ties = compared + int(clear.sum()), ties + int((~clear).sum())
     if ties > compared:
@@ -104,7 +106,8 @@ def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32]
     return ParityReport(tuple(spec.sizes), compared, ties, len(answered), uv_error, score_error)
 
 
-def _load(content: bytes) -> onnxruntime.InferenceSession:
+def load_model(content: bytes) -> onnxruntime.InferenceSession:
+    """The model on one CPU provider.  Raises: ParityError when onnxruntime refuses it."""
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
     try:
@@ -114,13 +117,15 @@ def _load(content: bytes) -> onnxruntime.InferenceSession:
         raise ParityError(f"onnxruntime can't load the graph ({reason}), expected a valid model; report it") from error
 
 
-def _run(session: onnxruntime.InferenceSession, points: NDArray[np.float32]) -> list[NDArray[np.generic]]:
-    """Outputs uv, chart, score."""
+def run_model(
+    session: onnxruntime.InferenceSession, outputs: Sequence[str], feed: Mapping[str, NDArray[Any]]
+) -> list[NDArray[np.generic]]:
+    """The outputs named.  Raises: ParityError when onnxruntime can't compute them."""
     try:
-        found = session.run(["uv", "chart", "score"], {"points": points})
+        found = session.run(list(outputs), dict(feed))
     except (Fail, InvalidArgument, RuntimeException) as error:
         reason = str(error).splitlines()[0]
-        message = f"onnxruntime can't run the graph at n = {len(points)} ({reason})"
+        message = f"onnxruntime can't run the graph at n = {len(next(iter(feed.values())))} ({reason})"
         raise ParityError(f"{message}, expected it to run; report this model, nothing was written") from error
     return [np.asarray(output) for output in found]
 
@@ -133,7 +138,7 @@ def _ties(logits: NDArray[np.float32], tie: float) -> NDArray[np.bool_]:
     return ordered[:, -1] - ordered[:, -2] <= tie * (1.0 + np.abs(logits).max(axis=1))
 
 
-def _difference(
+def largest_difference(
     name: str, found: NDArray[np.generic], truth: NDArray[np.generic], clear: NDArray[np.bool_], n: int, atol: float
 ) -> float:
     """Largest |Δ| over the points without a tie."""
