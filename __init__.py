@@ -16,26 +16,30 @@ from .runtime.errors import FlexparaError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import trimesh
-    from numpy.typing import ArrayLike
-
     from . import bake as bake
     from . import export as export
     from . import runtime as runtime
     from . import train as train
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset, Atlas, Charts, Frame
+    from .runtime.meshfile import MeshLike
+    from .runtime.meshfile import load as load
     from .runtime.options import Options, Outputs
     from .runtime.progress import Progress
     from .runtime.session import UnwrapSession
     from .train.networks import AtlasNetworks
 
-    MeshLike = str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike]
-
 __version__ = "0.1.0"
-__all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResult", "UnwrapSession", "unwrap"]
+__all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResult", "UnwrapSession", "load", "unwrap"]
 
-_HOME = {"Asset": "mesh", "Atlas": "mesh", "Options": "options", "Outputs": "options", "UnwrapSession": "session"}
+_HOME = {
+    "Asset": "mesh",
+    "Atlas": "mesh",
+    "load": "meshfile",
+    "Options": "options",
+    "Outputs": "options",
+    "UnwrapSession": "session",
+}
 _FOLDERS = ("bake", "export", "runtime", "train")
 
 
@@ -84,23 +88,11 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[train] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
+    from .runtime.meshfile import load
     from .runtime.options import Options
 
     options = Options(charts, size, padding, seed, preset, mode, steps, width, precision, tuple(ablation))
     return unwrap_asset(load(mesh), options, progress)
-
-
-def load(mesh: MeshLike) -> Asset:
-    """The mesh as an Asset, cleaned.  Raises: InputError when it is no mesh, or one with nothing to unwrap."""
-    from .runtime.meshfile import asset_from_arrays, load_asset
-
-    if isinstance(mesh, str | Path):
-        return load_asset(Path(mesh))
-    if isinstance(mesh, tuple):
-        return asset_from_arrays(*mesh)
-    visual: Any = mesh.visual
-    colors = visual.vertex_colors if visual.kind == "vertex" else None
-    return asset_from_arrays(mesh.vertices, mesh.faces, colors=colors, uv=getattr(visual, "uv", None))
 
 
 def unwrap_asset(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapResult:

@@ -9,6 +9,7 @@ A file may come from anyone: it reaches nothing outside its folder, no network, 
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,9 +24,10 @@ from .objfile import read_obj
 from .rawmesh import RawMesh, as_rgba, unit_vectors
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    import trimesh
     from numpy.typing import ArrayLike, NDArray
+
+    MeshLike = str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike]
 
 MAX_BYTES = 8 << 30
 
@@ -60,6 +62,17 @@ def load_asset(path: Path) -> Asset:
         return clean(_read(data, path), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error
+
+
+def load(mesh: MeshLike) -> Asset:
+    """The mesh as an Asset, cleaned.  Raises: InputError when it is no mesh, or one with nothing to unwrap."""
+    if isinstance(mesh, str | Path):
+        return load_asset(Path(mesh))
+    if isinstance(mesh, tuple):
+        return asset_from_arrays(*mesh)
+    visual: Any = mesh.visual
+    colors = visual.vertex_colors if visual.kind == "vertex" else None
+    return asset_from_arrays(mesh.vertices, mesh.faces, colors=colors, uv=getattr(visual, "uv", None))
 
 
 def asset_from_arrays(

@@ -1,0 +1,89 @@
+"""Commands that need neither torch nor OpenGL.  Options in, one call, files and summary out."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .console import Flag, Output, show
+from .errors import InputError
+from .options import Options
+
+SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
+
+
+def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) -> int:
+    """Chart and uv of any points of an unwrapped surface, without torch and without the mesh.
+
+    Args:
+        bundle: the .onnx file that unwrap wrote
+        points: .npy, .npz, .csv or .ply, in the units of the source file
+        output: .npz or .csv, receives points, uv, chart and score
+        force: overwrite the file
+    """
+    from .files import OutputFolder, write_whole
+    from .pointfile import check_output, read_points, write_unwrapped
+    from .session import UnwrapSession
+
+    check_output(output)
+    OutputFolder(output.parent, output.stem, force=force).check([output.name])
+    session, xyz = UnwrapSession(bundle), read_points(points)
+    answer = session.unwrap(xyz)
+    write_whole(output, lambda path: write_unwrapped(path, xyz, *answer), force=force)
+    return 0
+
+
+def evaluate(
+    mesh: Path, *, size: int | None = None, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
+) -> int:
+    """Metrics of a mesh with uv, whoever made it.
+
+    Args:
+        mesh: a mesh with uv
+        size: atlas side in texels, for texel density and bleeding
+        as_json: print JSON
+    """
+    if size is not None:
+        Options(size=size)
+    from .meshfile import load
+    from .metrics import measure
+
+    asset = load(mesh)
+    if asset.uv is None:
+        raise InputError(
+            f"{mesh} has no uv, expected a mesh that carries them; make some: flexpara unwrap {mesh} -o out/"
+        )
+    metrics = measure(asset.surface, asset.uv[asset.faces], size=size).to_dict()
+    if as_json:
+        sys.stdout.write(json.dumps(metrics, indent=2) + "\n")
+    else:
+        show(metrics, ())
+    return 0
+
+
+def sample(name: str, *, output: Output, resolution: int | None = None, force: Flag = False) -> int:
+    """Write a procedural test surface.
+
+    Args:
+        name: sphere, torus, trefoil, gyroid, bracket, cloth, …
+        output: .ply, .obj, .stl, .off or .glb
+        resolution: edges along the longest line
+        force: overwrite the file
+    """
+    from .files import OutputFolder, write_whole
+    from .samples import make_sample
+
+    if output.suffix.lower() not in SAMPLE_FORMATS:
+        expected = ", ".join(SAMPLE_FORMATS)
+        raise InputError(f"output ends in {output.suffix or 'nothing'}, expected one of {expected}; rename {output}")
+    OutputFolder(output.parent, output.stem, force=force).check([output.name])
+    vertices, faces = make_sample(name) if resolution is None else make_sample(name, resolution=resolution)
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    write_whole(output, lambda path: mesh.export(path), force=force)
+    return 0
