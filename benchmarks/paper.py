@@ -25,9 +25,9 @@ from flexpara.runtime.errors import FlexparaError
 from flexpara.runtime.meshfile import load_asset
 from flexpara.runtime.metrics import measure
 
-from .paper_markdown import QUANTITIES, markdown, name_of
+from .paper_markdown import comparisons, markdown, name_of
 from .systems import ABLATIONS, MODES, MODES_OF, NAMES, Job, Outcome, run
-from .tables import coverage, figures_of, load_figures, measures
+from .tables import coverage, load_figures
 from .unwrap import ROOT, SUFFIXES, header
 
 if TYPE_CHECKING:
@@ -101,21 +101,6 @@ def with_ratios(rows: list[Row]) -> list[Row]:
         return row["metrics"]["isometric_mean"] / max(reference["metrics"]["isometric_mean"], 1e-12)
 
     return [row | {"isometric_ratio": ratio(row)} for row in rows]
-
-
-def comparisons(rows: list[Row]) -> list[Row]:
-    """Each figure of the paper whose model, mode and system were measured here, with what was measured."""
-    found, figures = list[Row](), load_figures()
-    for row in (row for row in rows if row["status"] == "done"):
-        for item in figures_of(figures, row["mesh"], row["mode"]):
-            if not measures(row, item):
-                continue
-            quantity = QUANTITIES[item.quantity]
-            same = {"table": item.table, "label": item.label, "model": item.model, "mode": item.mode}
-            same |= {"paper_system": item.system, "system": row["system"], "ablation": row["ablation"]}
-            same["quantity"] = item.quantity
-            found.append(same | {"paper": item.value, "measured": quantity.of(row), "comparable": quantity.comparable})
-    return found
 
 
 def about(arguments: argparse.Namespace) -> Row:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .systems import MODES
-from .tables import coverage, figures_of, load_figures, load_tables
+from .tables import coverage, figures_of, load_figures, load_tables, measures
 
 if TYPE_CHECKING:
     from .tables import Figure
@@ -90,7 +90,7 @@ def markdown(facts: Row, rows: list[Row]) -> str:
     parts += [
         f"## {mode.capitalize()}\n\n{table(mode, [row for row in rows if row['mode'] == mode])}" for mode in modes
     ]
-    return "\n\n".join([*parts, notes(), not_run(rows)]) + "\n"
+    return "\n\n".join([*parts, beside(rows), notes(), not_run(rows)]) + "\n"
 
 
 def heading(facts: Row) -> str:
@@ -104,9 +104,9 @@ def heading(facts: Row) -> str:
 
 def plain(value: Any) -> str:
     """A setting in words."""
-    return (
-        "+".join(value) if isinstance(value, tuple | list) else f"{value:g}" if isinstance(value, float) else str(value)
-    )
+    if isinstance(value, tuple | list):
+        return "+".join(value) or "none"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def table(mode: str, rows: list[Row]) -> str:
@@ -176,6 +176,38 @@ def paper_cells(mesh: str, group: list[Figure], figures: list[Figure]) -> list[s
     values.insert(2, "" if ours is None else f"{ours.value / xatlas[ours.table]:.2f}")
     tables = ", ".join(dict.fromkeys(item.table for item in group))
     return [mesh, f"paper: {PAPER_NAMES[group[0].system]}", *values, "", "", tables]
+
+
+def comparisons(rows: list[Row]) -> list[Row]:
+    """Each figure of the paper whose model, mode, system and ablation were measured here, with what was measured.
+
+    paper, measured: in the unit of the figure.  raw: the network's own map, where the run says so, else None.
+    comparable: whether the paper's definition fits ours; ratios of the others mean nothing.
+    """
+    found, figures = list[Row](), load_figures()
+    for row in (row for row in rows if row["status"] == "done"):
+        for item in (item for item in figures_of(figures, row["mesh"], row["mode"]) if measures(row, item)):
+            quantity = QUANTITIES[item.quantity]
+            same = {"table": item.table, "label": item.label, "model": item.model, "mode": item.mode}
+            same |= {"paper_system": item.system, "system": row["system"], "ablation": row["ablation"]}
+            same |= {"quantity": item.quantity, "paper": item.value, "measured": quantity.of(row)}
+            raw = raw_value(row["raw"], item.quantity) if row["raw"] else None
+            found.append(same | {"raw": raw, "comparable": quantity.comparable})
+    return found
+
+
+def beside(rows: list[Row]) -> str:
+    """The comparable figures one by one: the paper's, ours, and ours over the paper's."""
+    titles = ["paper", "model", "mode", "system", "quantity", "paper's", "measured", "÷ paper's", "raw"]
+    lines = [joined(titles), "|---" * len(titles) + "|"]
+    for item in (item for item in comparisons(rows) if item["comparable"]):
+        quantity = QUANTITIES[item["quantity"]]
+        names = [item["table"], item["model"], item["mode"], f"{item['system']} {item['ablation']}".strip()]
+        numbers = [quantity.text(item["paper"]), quantity.text(item["measured"])]
+        ratio = f"{item['measured'] / item['paper']:.2f}"
+        lines.append(joined([*names, quantity.heading, *numbers, ratio, quantity.text(item["raw"])]))
+    whole = "\n".join(lines) if len(lines) > 2 else "None: no run that is done has a figure in the paper's tables."
+    return f"## Figure by figure, where definitions agree\n\n{whole}"
 
 
 def notes() -> str:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks import paper
-from benchmarks.paper_markdown import QUANTITIES, table
+from benchmarks.paper_markdown import QUANTITIES, beside, comparisons, plain, table
 from benchmarks.systems import Answer, Job, Outcome
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.meshfile import asset_from_arrays
@@ -116,14 +116,26 @@ def test_the_papers_figures_stand_beside_those_of_the_same_system(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     rows = rows_with(FakeRun(), monkeypatch, tmp_path)
-    found = {(item["mode"], item["system"], item["quantity"]): item for item in paper.comparisons(rows)}
+    found = {(item["mode"], item["system"], item["quantity"]): item for item in comparisons(rows)}
     assert found["global", "flexpara", "conformality"]["paper"] == 0.0634
-    assert found["multi-chart", "xatlas", "charts"] | {"label": ""} == {
+    assert found["multi-chart", "xatlas", "charts"] | {"label": "", "raw": None} == {
         "table": "Table 4", "label": "", "model": "Bunny", "mode": "multi-chart", "paper_system": "xatlas",
-        "system": "xatlas", "ablation": "", "quantity": "charts", "paper": 47.0, "measured": 4, "comparable": True,
+        "system": "xatlas", "ablation": "", "quantity": "charts", "paper": 47.0, "measured": 4, "raw": None,
+        "comparable": True,
     }  # fmt: skip
     assert not found["multi-chart", "flexpara", "seam_length"]["comparable"]
     assert len(found) == 2 + 2 + 3 * 4
+    assert found["global", "flexpara", "conformality"]["raw"] == RAW["conformality"]
+
+
+def test_figure_by_figure_only_what_agrees_in_definition(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    text = beside(rows_with(FakeRun(), monkeypatch, tmp_path))
+    assert "| Table 2 | Bunny | global | flexpara | seconds | 405.00 | 12.50 | 0.03 |  |" in text
+    assert "seam" not in text
+    assert "isometric" not in text
+    assert "None: no run" in beside(
+        rows_with(FakeRun(flexpara="failed"), monkeypatch, tmp_path, "--systems", "flexpara")
+    )
 
 
 def test_a_run_that_is_not_done_has_no_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -133,7 +145,7 @@ def test_a_run_that_is_not_done_has_no_number(monkeypatch: pytest.MonkeyPatch, t
     line = next(line for line in table("global", rows).splitlines() if "**flexpara**" in line)
     assert not any(character.isdigit() for character in line)
     assert "incomplete: for a reason" in line
-    assert "flexpara" not in {item["system"] for item in paper.comparisons(rows)}
+    assert "flexpara" not in {item["system"] for item in comparisons(rows)}
     assert {row["isometric_ratio"] for row in rows} == {None}
 
 
@@ -164,6 +176,10 @@ def test_the_papers_ratio_to_xatlas_is_printed(monkeypatch: pytest.MonkeyPatch, 
     lines = table("multi-chart", rows_with(FakeRun(), monkeypatch, tmp_path)).splitlines()
     cells = [cell.strip() for cell in next(line for line in lines if "paper: FlexPara" in line).split("|")[1:-1]]
     assert cells == ["bunny", "paper: FlexPara", "", "6.4", "1.14", "", "8", "29.42", "1371.00", "", "", "Table 4"]
+
+
+def test_settings_are_printed_plainly() -> None:
+    assert [plain(value) for value in (600.0, ("a", "b"), (), "fast", 8)] == ["600", "a+b", "none", "fast", "8"]
 
 
 def test_only_what_the_paper_defines_is_called_comparable() -> None:
