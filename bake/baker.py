@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from ..runtime.mesh import Atlas
     from .images import FileType
-    from .layout import Window
     from .tiles import Device
 
 SurfaceFunction = Callable[["NDArray[np.float32]", "NDArray[np.float32]", "NDArray[np.int64]"], "ArrayLike"]
@@ -94,10 +93,15 @@ def bake(
     if drawn:
         with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
             covered = np.zeros((texels, texels), np.bool_)
-            for window, held, parts in map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress):
-                covered[window.rows, window.columns] = held
-                for name, part in parts.items():
-                    pixels[name] = put(pixels.get(name), window, part, texels)
+            for baked in map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress):
+                covered[baked.window.rows, baked.window.columns] = baked.covered
+                for entry in drawn:
+                    part = baked.maps[entry.name]
+                    image = pixels[entry.name] = with_channels(pixels.get(entry.name), part.shape[2], texels)
+                    target = image[baked.window.rows, baked.window.columns]
+                    background = np.asarray((*entry.background, 1.0)[: part.shape[2]], np.float32)
+                    baked.gutter.fill(part, background, target[..., : part.shape[2]])
+                    target[..., part.shape[2] :] = 1.0
         if padding is None:
             gutter = find_gutter(covered, None)
             pixels = {name: gutter.fill(image, image[0, 0]) for name, image in pixels.items()}
@@ -155,20 +159,16 @@ def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
         return rasterize(context, atlas, size)
 
 
-def put(image: NDArray[np.float32] | None, window: Window, part: NDArray[np.float32], size: int) -> NDArray[np.float32]:
-    """The image (size, size, c) with a part in its window; made by the first part, given alpha 1 by the first with it.
+def with_channels(image: NDArray[np.float32] | None, channels: int, size: int) -> NDArray[np.float32]:
+    """An image (size, size, c) of at least so many channels: new, as it is, or with alpha 1 added.
 
     The number of channels may differ from window to window: a map leaves out alpha where it is 1.
     """
-    channels = part.shape[2]
     if image is None:
-        image = np.zeros((size, size, channels), np.float32)
-    if channels > image.shape[2]:
-        image = np.concatenate([image, np.ones((size, size, channels - image.shape[2]), np.float32)], axis=2)
-    target = image[window.rows, window.columns]
-    target[..., :channels] = part
-    target[..., channels:] = 1.0
-    return image
+        return np.zeros((size, size, channels), np.float32)
+    if image.shape[2] >= channels:
+        return image
+    return np.concatenate([image, np.ones((size, size, channels - image.shape[2]), np.float32)], axis=2)
 
 
 def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:

@@ -29,20 +29,49 @@ class Gutter:
     """Which texels to fill, and from where; one Gutter serves all maps of a G-buffer.
 
     target, source: (g,) int64 flat texel indices: value[target] = value[source].
-    beyond: (b,) int64 flat indices of the free texels farther away than the radius: they take the background.
+    beyond: (h, w) bool, the free texels farther away than the radius: they take the background.
     """
 
     target: NDArray[np.int64]
     source: NDArray[np.int64]
-    beyond: NDArray[np.int64]
+    beyond: NDArray[np.bool_]
 
     def fill(self, pixels: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:
         """(h, w, c) float32 and a background (c,) → a new array with gutters filled and background beyond them."""
-        filled = np.array(pixels, np.float32, order="C")
-        flat = filled.reshape(-1, filled.shape[-1])
-        flat[self.target] = np.take(flat, self.source, axis=0)
-        flat[self.beyond] = background
+        filled = np.zeros(pixels.shape, np.float32)
+        self.part(slice(pixels.shape[0]), slice(pixels.shape[1])).fill(pixels, background, filled)
         return filled
+
+    def part(self, rows: slice, columns: slice) -> GutterPart:
+        """What concerns some rows and columns of the image."""
+        part = self.beyond[rows, columns]
+        row, column = np.divmod(self.target, self.beyond.shape[1])
+        row -= rows.start or 0
+        column -= columns.start or 0
+        held = (row >= 0) & (row < part.shape[0]) & (column >= 0) & (column < part.shape[1])
+        return GutterPart(rows, columns, row[held], column[held], self.source[held], part)
+
+
+@dataclass(frozen=True, eq=False)
+class GutterPart:
+    """A part of an image to fill, from the whole of it.
+
+    rows, columns: which part.  row, column: (g,) int64 targets, counted in the part.  source: (g,) int64 flat indices
+    in the image.  beyond: (high, wide) bool.
+    """
+
+    rows: slice
+    columns: slice
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    source: NDArray[np.int64]
+    beyond: NDArray[np.bool_]
+
+    def fill(self, pixels: NDArray[np.float32], background: NDArray[np.float32], into: NDArray[np.float32]) -> None:
+        """Put that part of pixels (h, w, c), filled, into an array (high, wide, c)."""
+        into[...] = pixels[self.rows, self.columns]
+        into[self.beyond] = background
+        into[self.row, self.column] = pixels[np.divmod(self.source, pixels.shape[1])]
 
 
 def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
@@ -55,14 +84,14 @@ def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
         raise InputError(f"padding {radius}: expected 0 texels or more, or None for the whole image")
     none = np.zeros(0, np.int64)
     if radius == 0 or not covered.any():
-        return Gutter(target=none, source=none, beyond=np.flatnonzero(~covered))
+        return Gutter(target=none, source=none, beyond=~covered)
     if radius is None or radius > MOST_NEAR:
         return _by_transform(covered, radius)
     down = _down_to_nearest(covered, radius)
     target, source = _nearest_within(covered, down, radius)
     beyond = ~covered
     beyond.reshape(-1)[target] = False
-    return Gutter(target=target, source=source, beyond=np.flatnonzero(beyond))
+    return Gutter(target=target, source=source, beyond=beyond)
 
 
 def _by_transform(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
@@ -73,7 +102,9 @@ def _by_transform(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
     row, column = np.asarray(indices, np.int32).reshape(2, -1)[:, free].astype(np.int64)
     down, across = row - free // width, column - free % width
     near = np.ones(len(free), np.bool_) if radius is None else down * down + across * across <= radius * radius
-    return Gutter(target=free[near], source=(row * width + column)[near], beyond=free[~near])
+    beyond = ~covered
+    beyond.reshape(-1)[free[near]] = False
+    return Gutter(target=free[near], source=(row * width + column)[near], beyond=beyond)
 
 
 def _down_to_nearest(covered: NDArray[np.bool_], radius: int) -> NDArray[np.int8]:

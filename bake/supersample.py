@@ -27,7 +27,7 @@ def samples_along(samples: int) -> int:
 
 def covered_texels(covered: NDArray[np.bool_], along: int) -> NDArray[np.bool_]:
     """(k h, k w) → (h, w) bool: whether a sample of the texel holds a surface."""
-    return _blocks(covered[..., None], along).any(axis=(1, 3))[..., 0]
+    return np.asarray(_blocks(covered[..., None], along).any(axis=(1, 3)))[..., 0]
 
 
 def averaged(
@@ -53,7 +53,7 @@ def first_covered(pixels: NDArray[np.float32], covered: NDArray[np.bool_], along
     values = _blocks(pixels, along).transpose(order).reshape(height, width, along * along, channels)
     held = _blocks(covered[..., None], along).transpose(order).reshape(height, width, along * along)
     chosen = np.take_along_axis(values, held.argmax(axis=2)[..., None, None], axis=2)[:, :, 0]
-    return np.where(held.any(axis=2)[..., None], chosen, np.float32(0.0))
+    return np.where(np.asarray(held.any(axis=2))[..., None], chosen, np.float32(0.0))
 
 
 def _blocks(values: NDArray[Any], along: int) -> NDArray[Any]:

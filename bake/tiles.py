@@ -16,7 +16,7 @@ import numpy as np
 from ..runtime.errors import InputError, MissingDependencyError
 from .context import max_texture_size, open_context
 from .gbuffer import DeviceRasterizer, GBuffer
-from .gutter import find_gutter
+from .gutter import GutterPart, find_gutter
 from .layout import Layout, Planes, Window, check_size, windows
 from .software import SoftwareRasterizer
 from .supersample import averaged, covered_texels, first_covered, samples_along
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 Device = Literal["auto", "opengl", "software"]
 DEVICES: tuple[Device, ...] = ("auto", "opengl", "software")
 
-WINDOW = 1 << 22
-"""Samples drawn at once, about: 150 MB of targets and arrays."""
+WINDOW = 1 << 21
+"""Samples drawn at once, about: 150 MB of targets and arrays, and what maps make in between stays small."""
 
 
 class SoftwareWarning(UserWarning):
@@ -138,8 +138,8 @@ def map_windows(
     atlas: Atlas,
     asset: Asset,
     progress: Callable[[str], None] | None = None,
-) -> Iterator[tuple[Window, NDArray[np.bool_], dict[str, NDArray[np.float32]]]]:
-    """Window by window: which texels hold a surface (h, w), and the maps (h, w, c), gutters of halo width filled.
+) -> Iterator[BakedWindow]:
+    """Window by window, every map.
 
     progress: called with each map's name before it is made the first time.
     Raises: InputError when a map's function returns another shape than (h, w, 1 to 4).
@@ -151,16 +151,27 @@ def map_windows(
         gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width))
         held = gbuffer.face >= 0
         covered = covered_texels(held, plan.along) if plan.along > 1 else held
-        gutter = find_gutter(covered, plan.halo)
         rows, columns = window.within(wide)
         maps: dict[str, NDArray[np.float32]] = {}
         for entry in entries:
             if progress is not None and number == 0:
                 progress(entry.name)
-            pixels = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
-            background = np.asarray((*entry.background, 1.0)[: pixels.shape[2]], np.float32)
-            maps[entry.name] = gutter.fill(pixels, background)[rows, columns]
-        yield window, covered[rows, columns], maps
+            maps[entry.name] = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
+        yield BakedWindow(window, covered[rows, columns], find_gutter(covered, plan.halo).part(rows, columns), maps)
+
+
+@dataclass(frozen=True, eq=False)
+class BakedWindow:
+    """The maps of a window.
+
+    covered: (h, w) bool, which texels hold a surface.  maps: name → pixels of the window with its halo, before gutters;
+    gutter.fill takes the halo off.
+    """
+
+    window: Window
+    covered: NDArray[np.bool_]
+    gutter: GutterPart
+    maps: dict[str, NDArray[np.float32]]
 
 
 def computed(entry: BakeMap, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:

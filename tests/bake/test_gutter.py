@@ -36,7 +36,30 @@ def test_the_source_is_a_nearest_covered_texel(radius: int | None) -> None:
     for place in np.flatnonzero(~covered.reshape(-1)):
         nearest = np.sqrt(((places - np.array(divmod(int(place), 21))) ** 2).sum(axis=1)).min()
         assert reached[place] == (radius is None or nearest <= radius)
-    np.testing.assert_array_equal(np.sort(np.concatenate([gutter.target, gutter.beyond])), np.flatnonzero(~covered))
+    assert not gutter.beyond.reshape(-1)[gutter.target].any()
+    assert not (gutter.beyond & covered).any()
+    assert len(gutter.target) + gutter.beyond.sum() == (~covered).sum()
+
+
+def test_a_part_of_an_image_is_filled_like_the_whole() -> None:
+    rng = np.random.default_rng(2)
+    covered = rng.random((40, 50)) < 0.02
+    pixels = rng.random((40, 50, 2), np.float32)
+    gutter, background = find_gutter(covered, 4), np.array([9.0, 8.0], np.float32)
+    rows, columns = slice(7, 31), slice(3, 44)
+    into = np.zeros((24, 41, 2), np.float32)
+    gutter.part(rows, columns).fill(pixels, background, into)
+    np.testing.assert_array_equal(into, gutter.fill(pixels, background)[rows, columns])
+
+
+def test_a_window_with_a_halo_finds_what_the_whole_image_finds() -> None:
+    covered = np.random.default_rng(3).random((60, 70)) < 0.03
+    whole, part = find_gutter(covered, 5), find_gutter(covered[10:50, 20:60], 5)
+    source = dict(zip(whole.target.tolist(), whole.source.tolist(), strict=True))
+    for target, found in zip(part.target, part.source, strict=True):
+        row, column = divmod(int(target), 40)
+        if 5 <= row < 35 and 5 <= column < 35:
+            assert source[(row + 10) * 70 + column + 20] == (found // 40 + 10) * 70 + found % 40 + 20
 
 
 def test_two_charts_meet_half_way() -> None:
