@@ -8,6 +8,7 @@ H = (κ₁ + κ₂) / 2, in 1 / source units: 1 / r on a ball of radius r.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,8 @@ from ..runtime.mesh import Frame
 from ..runtime.topology import edge_table
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas, Surface
@@ -28,20 +31,25 @@ RADIUS = 0.1
 """Of the ball that is shown at 3/4, in radii of the mesh: features the eye sees differ around here."""
 
 
-def curvature_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-    """(h, w, 1) float32 in [0, 1]: ½ flat, above convex, below hollow; ½ + ½ x / (1 + |x|), x = H · RADIUS · radius.
+def curvature_map() -> Callable[[GBuffer, Atlas, Asset], NDArray[np.float32]]:
+    """Mean curvature, shaped to [0, 1]: ½ flat, above convex, below hollow: ½ + ½ x / (1 + |x|), x = H · RADIUS · r.
 
-    The radius is that of the mesh's bounding ball.
+    r is the radius of the mesh's bounding ball.  No space; unit, PNG 8 bits dithered by default (1 channel).
     """
-    del atlas
-    surface = asset.surface
-    scaled = mean_curvature(surface) * RADIUS * Frame.of(surface.vertices).scale
-    height, width = gbuffer.shape
-    result = np.full((height * width, 1), 0.5, np.float32)
-    for texels in gbuffer.chunks():
-        bend = gbuffer.interpolate(scaled[:, None], surface.faces, texels)
-        result[texels] = 0.5 + 0.5 * bend / (1.0 + np.abs(bend))
-    return result.reshape(height, width, 1)
+    ready = lru_cache(maxsize=1)(mean_curvature)
+
+    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+        del atlas
+        surface = asset.surface
+        scaled = (ready(surface) * RADIUS * Frame.of(surface.vertices).scale)[:, None]
+        height, width = gbuffer.shape
+        result = np.full((height * width, 1), 0.5, np.float32)
+        for texels in gbuffer.chunks():
+            bend = gbuffer.interpolate(scaled, surface.faces, texels)
+            result[texels] = 0.5 + 0.5 * bend / (1.0 + np.abs(bend))
+        return result.reshape(height, width, 1)
+
+    return compute
 
 
 def mean_curvature(surface: Surface, *, rounds: int = ROUNDS) -> NDArray[np.float64]:

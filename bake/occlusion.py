@@ -31,11 +31,12 @@ OFFSET = 3e-5
 
 
 def ambient_occlusion(
-    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None
+    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None, *, scene: RayScene | None = None
 ) -> NDArray[np.float32]:
     """(h, w, 1) float32: the cosine-weighted part of the hemisphere that is open, 1 = nothing in the way.
 
-    Both sides of a face occlude.  Error against many rays: about 0.3 / count^¾ rms.
+    Both sides of a face occlude.  Error against many rays: about 0.3 / count^¾ rms.  scene: of the asset's surface,
+    where it is at hand.
     """
     settings = settings or RaySettings()
     reach = settings.distance / Frame.of(asset.surface.vertices).scale
@@ -45,11 +46,12 @@ def ambient_occlusion(
         count = direction.shape[1]
         return (1.0 - np.count_nonzero(blocked.reshape(-1, count), axis=1)[:, None] / count).astype(np.float32)
 
-    return _gather(gbuffer, atlas, asset, settings, open_part, channels=1)
+    scene = scene or RayScene.of(asset.surface)
+    return _gather(gbuffer, atlas, asset, settings, scene, open_part, channels=1)
 
 
 def bent_normals(
-    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None
+    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None, *, scene: RayScene | None = None
 ) -> NDArray[np.float32]:
     """(h, w, 3) float32 unit, object space: the cosine-weighted mean of the open directions.
 
@@ -66,15 +68,18 @@ def bent_normals(
         total = np.einsum("ts,tsi->ti", weight.astype(np.float32), direction)
         return _unit_or(total, normal)
 
-    return _gather(gbuffer, atlas, asset, settings, mean_open, channels=3)
+    scene = scene or RayScene.of(asset.surface)
+    return _gather(gbuffer, atlas, asset, settings, scene, mean_open, channels=3)
 
 
-def thickness(gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None) -> NDArray[np.float32]:
-    """(h, w, 1) float32 in [0, 1]: how deep the body is beneath the surface, in diameters of the mesh's bounding ball.
+def thickness(
+    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings | None = None, *, scene: RayScene | None = None
+) -> NDArray[np.float32]:
+    """(h, w, 1) float32 in [0, 1]: how deep the body is beneath the surface, in radii of the mesh's bounding ball.
 
     Rays go inwards, cosine-weighted; of each that meets the far side the depth below the surface point counts (its
-    part along the normal), so a slab of any orientation has exactly its own thickness, a ball its radius.  Rays that
-    leave through a hole do not count, and where all do the thickness is 0.
+    part along the normal), so a slab of any orientation has exactly its own thickness, a ball its radius, which is 1
+    (what is deeper is shown as 1).  Rays that leave through a hole do not count, and where all do the thickness is 0.
     """
     settings = settings or RaySettings()
     reach = settings.distance / Frame.of(asset.surface.vertices).scale
@@ -86,9 +91,10 @@ def thickness(gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySetting
         along = -np.einsum("tsi,ti->ts", direction, normal)
         depth = np.where(hits.hit, hits.distance, 0.0).reshape(along.shape) * along
         count = np.count_nonzero(hits.hit.reshape(along.shape), axis=1)
-        return (0.5 * depth.sum(axis=1) / np.maximum(count, 1))[:, None].astype(np.float32)
+        return np.minimum(depth.sum(axis=1) / np.maximum(count, 1), 1.0)[:, None].astype(np.float32)
 
-    return _gather(gbuffer, atlas, asset, settings, mean_depth, channels=1, inwards=True)
+    scene = scene or RayScene.of(asset.surface)
+    return _gather(gbuffer, atlas, asset, settings, scene, mean_depth, channels=1, inwards=True)
 
 
 def starting_points(
@@ -130,13 +136,13 @@ def _gather(
     atlas: Atlas,
     asset: Asset,
     settings: RaySettings,
+    scene: RayScene,
     kernel: Kernel,
     *,
     channels: int,
     inwards: bool = False,
 ) -> NDArray[np.float32]:
     """(h, w, channels): kernel(scene, origin, direction, normal) of all covered texels, a batch of rays at a time."""
-    scene = RayScene.of(asset.surface)
     patterns = sphere_patterns(settings.count, settings.seed)
     height, width = gbuffer.shape
     result = np.zeros((height * width, channels), np.float32)
@@ -144,7 +150,7 @@ def _gather(
     def batch(texels: NDArray[np.int64]) -> None:
         origin, normal = starting_points(gbuffer, atlas, asset, scene.frame, texels, inwards=inwards)
         axis = -normal if inwards else normal
-        direction = cosine_directions(patterns, pattern_of(texels, width), axis)
+        direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(texels), gbuffer.side), axis)
         result[texels] = kernel(scene, origin, direction, normal)
 
     in_batches(batch, gbuffer.texels, max(BATCH // settings.count, 1), settings.progress)

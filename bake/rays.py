@@ -115,6 +115,13 @@ class RayScene:
         """First hits of rays (r, 3), within reach (r,) lengths of their directions."""
         return _hits(found := self.caster.cast(origin, direction, None, reach), found.ray_depth)
 
+    def cast_facing(
+        self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
+    ) -> tuple[Hits, NDArray[np.bool_]]:
+        """As `cast`, and whether each ray (r,) meets the front of the face, the side its normal points to."""
+        found = self.caster.cast(origin, direction, None, reach)
+        return _hits(found, found.ray_depth), np.einsum("ri,ri->r", found.normal, direction) < 0.0
+
     def nearest(self, points: NDArray[np.float32]) -> Hits:
         """Nearest surface points of points (r, 3)."""
         return _hits(found := self.caster.closest_point(points), found.distance)

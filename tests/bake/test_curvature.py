@@ -77,7 +77,7 @@ def test_sharing_keeps_the_sum() -> None:
 def test_half_is_flat_and_a_ball_of_a_tenth_is_three_quarters(
     pair: Callable[..., Pair], quad: Pair, context: moderngl.Context
 ) -> None:
-    flat = curvature_map(rasterize(context, quad[0], 8), *quad)
+    flat = curvature_map()(rasterize(context, quad[0], 8), *quad)
     assert flat.shape == (8, 8, 1)
     np.testing.assert_array_equal(flat, 0.5)
     ball = sample("sphere", 24)
@@ -90,7 +90,7 @@ def test_half_is_flat_and_a_ball_of_a_tenth_is_three_quarters(
     assert abs(Frame.of(asset.surface.vertices).scale * RADIUS - 1) < 1e-6
     buffer = rasterize(context, replace(atlas, faces=ball.faces[chosen]), 64)
     buffer = replace(buffer, face=np.where(buffer.face >= 0, chosen[buffer.face], -1).astype(np.int32))
-    found = curvature_map(buffer, atlas, asset)[buffer.face >= 0]
+    found = curvature_map()(buffer, atlas, asset)[buffer.face >= 0]
     np.testing.assert_allclose(found, 0.75, atol=0.01)
 
 

@@ -167,10 +167,10 @@ def test_a_bowl_is_as_open_as_its_missing_part() -> None:
 
 
 def test_a_ball_is_as_thick_as_its_radius() -> None:
-    """Mean of 2 cos²θ over the cosine-weighted hemisphere is 1 radius, half the diameter."""
+    """Mean of 2 cos²θ over the cosine-weighted hemisphere is 1 radius; the flat faces of the sample take a little."""
     scene = ball(64)
     buffer = spread_over(scene, 40)
-    np.testing.assert_allclose(covered(buffer, thickness(buffer, *scene, RaySettings(1024))), 0.5, atol=0.01)
+    np.testing.assert_allclose(covered(buffer, thickness(buffer, *scene, RaySettings(1024))), 0.99, atol=0.01)
 
 
 @pytest.mark.parametrize("depth", [0.25, 1.0])
@@ -180,9 +180,9 @@ def test_a_slab_is_as_thick_as_it_is(depth: float) -> None:
     bottom = [[x, y, -depth] for x, y, _ in reversed(top)]
     scene = scene_of(quads(top, bottom))
     buffer = points_on(scene, [0], [[0.5, 0.0, 0.5]])
-    diameter = 2 * Frame.of(scene[1].surface.vertices).scale
+    radius = Frame.of(scene[1].surface.vertices).scale
     found = covered(buffer, thickness(buffer, *scene, RaySettings(256)))
-    np.testing.assert_allclose(found * diameter, depth, rtol=0.01)
+    np.testing.assert_allclose(found * radius, depth, rtol=0.01)
 
 
 def test_lift_reaches_the_tangent_planes_and_stays_on_hollow_ground() -> None:
