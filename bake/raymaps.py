@@ -60,7 +60,7 @@ def thickness_map(settings: RaySettings) -> Compute:
 def height_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
     """Height of the high-poly surface above the low-poly's.  Linear, source units, EXR float by default (1 channel).
 
-    Baked from high-poly meshes only (see transfer.py).  Raises: InputError here.
+    Baked from high-poly meshes only (see highmaps.py).  Raises: InputError here.
     """
     del gbuffer, atlas
     raise InputError(f"{asset.stem}: the height map is baked from a high-poly mesh; pass --high, or leave it out")
