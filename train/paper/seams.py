@@ -52,8 +52,11 @@ class SeamConfig:
 
 
 class Tears(NamedTuple):
-    """Where a map tears.  edge (e,): the tear across each edge, 0 at the border.  face (f,): the largest of a face's
-    edges.  band (v,) bool: ends of torn edges."""  # noqa: D209
+    """Where a map tears.
+
+    edge (e,): the tear across each edge, 0 at the border.  face (f,): the largest of a face's edges.  band (v,) bool:
+    ends of torn edges.
+    """
 
     edge: NDArray[np.float64]
     face: NDArray[np.float64]
@@ -78,7 +81,9 @@ def cut_points(
         ShapeError: uv doesn't fit the points.
     """
     if points.ndim != 2 or points.shape[1] != 3 or uv.shape != (len(points), 2):
-        raise ShapeError(f"expected points (n, 3) and uv (n, 2), got {points.shape} and {uv.shape}; pass one uv a point")
+        raise ShapeError(
+            f"expected points (n, 3) and uv (n, 2), got {points.shape} and {uv.shape}; pass one uv a point"
+        )
     count = min(neighbours + 1, len(points))
     if count < 2:
         return np.zeros(len(points), dtype=bool)
@@ -106,7 +111,7 @@ def tears(piece: Surface, uv: NDArray[np.float64], config: SeamConfig, table: Ed
 def usual_stretch(
     piece: Surface, uv: NDArray[np.float64], places: NDArray[np.float64], config: SeamConfig
 ) -> NDArray[np.float64]:
-    """(m,) √(uv area / area) around places (m, 3): the lower quartile, as bands have too much of it; never near zero."""
+    """(m,) √(uv area / area) around places (m, 3): the lower quartile, as bands have too much; never near 0."""
     corner = uv[piece.faces]
     first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     doubled = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

@@ -1,0 +1,271 @@
+"""From a learned global map to valid charts, one per connected component.   f faces · v vertices · unit ball.
+
+Valid means: no flipped triangle, no overlap, by exact tests.  Each component is opened along its learned seam, slit
+where a disk cannot carry it without stretch (slits lie inside the chart, and are found on a simplified twin), and
+flattened: from the network's own uv where those are valid once the band is laid out anew, else from the circle.
+SLIM lowers the symmetric Dirichlet energy, contacts hold apart what would overlap, and a few last steps of conformal
+energy trade a little area for angles, which is what the paper's global losses ask for.
+
+A disk always has a valid map to the circle, so one chart fails only where a triangle is too thin for float64; then the
+faces are split as everywhere else, and the report says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import igl
+import numpy as np
+
+from ...runtime.distortion import corner_angles
+from ...runtime.errors import ShapeError
+from ...runtime.mesh import Surface
+from ...runtime.overlap import flipped_triangles, signed_areas
+from ...runtime.topology import boundary_loops, edge_table, split_non_manifold_vertices
+from ..config import FinishConfig
+from ..contact import Relaxed, boundary_edges, excess_energy, relax, rim_overlaps, separate
+from ..disks import cut_open
+from ..finish import Finished, verify
+from ..flatten import circle_map
+from ..labels import connected_pieces, dual_graph
+from ..pieces import Piece, border_length
+from ..regroup import Regrouping
+from ..relief import Flat, Slit, relieve, slit_along
+from ..surrogate import simplified
+from .seams import SeamConfig, seam_edges, tears
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..config import ContactConfig
+    from ..finish import Stage
+    from ..labels import DualGraph
+
+
+@dataclass(frozen=True)
+class GlobalFinishConfig:
+    """Numbers of finishing a global map."""
+
+    seam: SeamConfig = field(default_factory=SeamConfig)
+    """From the band to seam edges."""
+    finish: FinishConfig = field(default_factory=FinishConfig)
+    """Flattening and relief, as for charts."""
+    twin_faces: int = 5000
+    """Faces of the simplified disk on which slits are tried."""
+    slits: int = 24
+    """Slits a component may get: one chart has to do what eight do elsewhere."""
+    failures: int = 6
+    """Slits that may fail to pay before the component is left as it is."""
+    steps: int = 30
+    """Steps of SLIM with contacts, where the chart would overlap: long cuts need more of them than slits do."""
+    conformal: int = 20
+    """SLIM iterations of conformal energy at the end; 0 leaves the isometric map."""
+
+
+class Opened(NamedTuple):
+    """A component opened into a disk.  Faces are in the component's order.
+
+    surface: the disk.  uv (v, 2): learned, both sides of a cut with their vertex's.  torn (f,) bool: in the band.
+    """
+
+    surface: Surface
+    uv: NDArray[np.float64]
+    torn: NDArray[np.bool_]
+
+
+class GlobalFinish(NamedTuple):
+    """finished: valid charts.  components: per component, JSON-ready facts about its seam and flattening."""
+
+    finished: Finished
+    components: list[dict[str, Any]]
+
+
+def finish_global(
+    surface: Surface, uv: NDArray[np.float64], stage: Stage, config: GlobalFinishConfig = GlobalFinishConfig()
+) -> GlobalFinish:
+    """Valid charts of a surface from one learned map: one per connected component, more only where that can't be had.
+
+    Args:
+        surface: in the unit ball; edges that are not manifold are cut.
+        uv: (v, 2) learned map at the vertices, any units.
+        stage: called with the name of each stage as it begins.
+        config: numbers.
+
+    Raises:
+        ShapeError: uv doesn't fit the vertices, or is not finite.
+        FinishError: the result failed the exact check (a defect).
+    """
+    if uv.shape != (len(surface.vertices), 2) or not np.isfinite(uv).all():
+        raise ShapeError(
+            f"learned uv must be ({len(surface.vertices)}, 2) and finite, got {uv.shape} with "
+            f"{int((~np.isfinite(uv)).sum())} values that are not; train again, with a smaller rate where it diverged"
+        )
+    graph = dual_graph(surface, edge_table(surface.faces), config.finish.labels.crease_discount)
+    component = connected_pieces(np.zeros(len(surface.faces), dtype=np.int64), graph)
+    stage("flatten")
+    done = [
+        finish_component(surface, np.flatnonzero(component == number), uv, graph, config)
+        for number in range(int(component.max()) + 1)
+    ]
+    pieces = sorted((piece for found, _ in done for piece in found), key=lambda piece: int(piece.ids.min()))
+    stage("exact check")
+    verify(pieces)
+    price = config.finish.relief.price
+    return GlobalFinish(Finished(pieces, sum(piece.cost(price) for piece in pieces)), [row for _, row in done])
+
+
+def finish_component(
+    surface: Surface,
+    ids: NDArray[np.int64],
+    uv: NDArray[np.float64],
+    graph: DualGraph,
+    config: GlobalFinishConfig,
+) -> tuple[list[Piece], dict[str, Any]]:
+    """Valid pieces of one component, faces ids (m,), and the facts about it; lengths in √(area of the surface)."""
+    total = float(surface.face_areas().sum())
+    unit = float(np.sqrt(total))
+    whole, opened = open_along_seam(surface, ids, uv, config.seam)
+    border = border_length(whole)
+    seam = (border_length(opened.surface) - border) / 2.0 / unit
+    slits = find_slits(opened.surface, total, config)
+    row: dict[str, Any] = {"faces": len(ids), "seam_length": seam, "slits": len(slits)}
+    flat, row["start"] = flattened(opened, slits, config)
+    if flat is None:
+        search = Regrouping(surface, graph, config.finish)
+        search.add_valid(ids)
+        return list(search.pieces.values()), {**row, "charts": len(search.pieces)}
+    energy = excess_energy(flat.surface, flat.uv) / total
+    length = (border_length(flat.surface) - border) / 2.0 / unit
+    return [Piece(ids, flat, energy, length, slits)], {**row, "charts": 1}
+
+
+def open_along_seam(
+    surface: Surface, ids: NDArray[np.int64], uv: NDArray[np.float64], config: SeamConfig
+) -> tuple[Surface, Opened]:
+    """One component (m,) of faces as a manifold piece, and opened along its seam."""
+    faces, old = split_non_manifold_vertices(surface.faces[ids])
+    piece, flat = Surface(surface.vertices[old], faces), uv[old]
+    table = edge_table(faces)
+    torn = tears(piece, flat, config, table).face > config.torn
+    opened, source = cut_open(faces, seam_edges(piece, flat, config), table)
+    return piece, Opened(Surface(piece.vertices[source], opened), flat[source], torn)
+
+
+def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> tuple[Slit, ...]:
+    """The slits that pay, by the disk's simplified twin; none where the twin has no valid start."""
+    twin = simplified(disk, config.twin_faces)
+    loops = boundary_loops(twin.faces)
+    start = circle_start(twin) if len(loops) == 1 else None
+    if start is None:
+        return ()
+    relief = replace(config.finish.relief, most=config.slits, failures=config.failures)
+    flat = Flat(twin, start, {}).relaxed(replace(relief.contact, steps=config.steps))
+    return relieve(flat, total_area, relief)[1]
+
+
+def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfig) -> tuple[Flat | None, str]:
+    """The disk with slits, valid, and where it began: "network" or "circle".
+
+    Both are tried, as either may end in an overlap that contacts hardly loosen; the lower energy is taken.  None and
+    "none" where neither start is valid.
+    """
+    contact = replace(config.finish.relief.contact, steps=config.steps)
+    disk = slit_along(opened.surface, slits, config.finish.relief)
+    starts = {"circle": circle_start(disk)}
+    learned = learned_start(opened)
+    if learned is not None:  # a slit leaves the flattening as it is: both sides take the uv of their vertex
+        starts["network"] = np.zeros((len(disk.vertices), 2))
+        starts["network"][disk.faces] = learned[opened.surface.faces]
+    states = {name: relax(disk, Relaxed(uv, {}), contact) for name, uv in starts.items() if uv is not None}
+    if not states:
+        return None, "none"
+    name = min(states, key=lambda name: excess_energy(disk, states[name].uv))
+    return Flat(disk, conformal_steps(disk, states[name], config.conformal, contact), {}), name
+
+
+def learned_start(opened: Opened, rounds: int = 6) -> NDArray[np.float64] | None:
+    """The network's uv at the disk's scale, the band and what folds laid out anew: valid, or None.
+
+    Vertices of the band follow from the others by least squares of conformality (LSCM), so each side of the seam goes
+    on as it was; where a flip is left, its vertices and their neighbours are let go too, for ``rounds`` rounds.
+    """
+    surface, uv = opened.surface, at_scale(opened)
+    if uv is None:
+        return None
+    loose = np.zeros(len(uv), dtype=bool)
+    wrong_faces = opened.torn | flipped_triangles(uv[surface.faces])
+    for _ in range(rounds):
+        loose[surface.faces[wrong_faces]] = True
+        kept = np.flatnonzero(~loose)
+        if len(kept) < max(3, len(uv) // 4):  # too little of the learned map is left to follow
+            return None
+        if len(kept) < len(uv):
+            corners, faces = np.asfortranarray(surface.vertices), np.asfortranarray(surface.faces)
+            uv = np.asarray(igl.lscm(corners, faces, kept, uv[kept])[0], dtype=np.float64)
+        if is_valid(surface, uv):
+            return uv
+        if not np.isfinite(uv).all():
+            return None
+        flipped = flipped_triangles(uv[surface.faces])
+        around = np.zeros(len(uv), dtype=bool)
+        around[surface.faces[flipped]] = True
+        wrong_faces = around[surface.faces].any(axis=1)
+    return None
+
+
+def at_scale(opened: Opened) -> NDArray[np.float64] | None:
+    """The learned uv scaled to the area of the faces outside the band, and mirrored where most of them are flipped."""
+    whole = ~opened.torn
+    area = signed_areas(opened.uv[opened.surface.faces[whole]])
+    if area.sum() == 0.0:
+        return None
+    scale = np.sqrt(opened.surface.face_areas()[whole].sum() / np.abs(area).sum())
+    return opened.uv * scale * [np.sign(area.sum()), 1.0]
+
+
+def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
+    """No flip, and a border that doesn't cross itself: for a disk, no overlap."""
+    if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
+        return False
+    return not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)
+
+
+def circle_start(disk: Surface) -> NDArray[np.float64] | None:
+    """The map (v, 2) to the circle; None where float64 can't hold it without a flip."""
+    uv = circle_map(disk, boundary_loops(disk.faces)[0])
+    return uv if np.isfinite(uv).all() and not flipped_triangles(uv[disk.faces]).any() else None
+
+
+def conformal_steps(disk: Surface, state: Relaxed, iterations: int, contact: ContactConfig) -> NDArray[np.float64]:
+    """The uv (v, 2) after SLIM with conformal energy, at the surface's scale; ``state`` where no valid end is found.
+
+    From an isometric map that took its slits, angles improve fast and areas give way a little; from a map that is far
+    from isometric, areas would vary without bound, so the iterations are few.  Overlap that comes on the way mostly
+    goes again: the last valid state counts, and contacts take apart what is left at the end.
+    """
+    solver = igl.slim_precompute(
+        np.asfortranarray(disk.vertices),
+        np.asfortranarray(disk.faces.astype(np.int32)),
+        np.asfortranarray(state.uv),
+        igl.MappingEnergyType.CONFORMAL,
+        np.zeros(0, dtype=np.int32),
+        np.zeros((0, 2)),
+        0.0,
+    )
+    best = uv = state.uv
+    for _ in range(iterations // contact.block):
+        uv = np.ascontiguousarray(igl.slim_solve(solver, contact.block))
+        uv = uv * np.sqrt(disk.face_areas().sum() / np.abs(signed_areas(uv[disk.faces])).sum())
+        if is_valid(disk, uv):
+            best = uv
+    if best is uv or flipped_triangles(uv[disk.faces]).any():
+        return best
+    apart = separate(disk, Relaxed(uv, {}), boundary_edges(disk.faces), contact)
+    candidates = [best] if apart is None or not is_valid(disk, apart.uv) else [best, apart.uv]
+    return min(candidates, key=lambda flat: angle_error(disk, flat))
+
+
+def angle_error(disk: Surface, uv: NDArray[np.float64]) -> float:
+    """Mean |angle − uv angle| over the corners of the faces, radians: the paper's conformality."""
+    return float(np.abs(corner_angles(disk.triangles) - corner_angles(uv[disk.faces])).mean())
