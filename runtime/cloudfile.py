@@ -158,10 +158,10 @@ def _read_text(data: bytes) -> NDArray[np.float64]:
     except UnicodeDecodeError as error:
         raise InputError(f"no UTF-8 text ({error.reason}); save it as UTF-8") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if not lines:
-        raise InputError("the file is empty, expected lines of x y z; check the export")
-    delimiter = next((mark for mark in (",", ";", "\t") if mark in lines[0]), None)
-    body = lines if _is_number(lines[0].split(delimiter)[0]) else lines[1:]
+    delimiter = next((mark for mark in (",", ";", "\t") if lines and mark in lines[0]), None)
+    body = lines if lines and _is_number(lines[0].split(delimiter)[0]) else lines[1:]
+    if not body:
+        raise InputError("the file holds no numbers, expected lines of x y z; check the export")
     try:
         return np.loadtxt(body, delimiter=delimiter, ndmin=2, comments=None)
     except ValueError as error:

@@ -103,11 +103,11 @@ def read_ply_points(data: bytes) -> dict[str, NDArray[Any]]:
         not kind for element in (*before, vertex) for _, kind in element.properties
     ):
         raise InputError("the PLY file has lists or repeated properties before or in its vertices; export it plainly")
-    rows = _binary_rows(data, header, before, vertex) if header.order else _ascii_rows(data, header, before, vertex)
     groups = {"points": ("x", "y", "z"), "normals": ("nx", "ny", "nz"), "colors": ("red", "green", "blue", "alpha")}
     found = {group: [name for name in members if name in columns] for group, members in groups.items()}
     if len(found["points"]) < 3:
         raise InputError(f"the PLY vertices have {columns}, expected x y z; check the export")
+    rows = _binary_rows(data, header, before, vertex) if header.order else _ascii_rows(data, header, before, vertex)
     result = {
         group: np.stack([rows[name] for name in members], axis=1)
         for group, members in found.items()
@@ -138,13 +138,13 @@ def _ascii_rows(data: bytes, header: PlyHeader, before: Sequence[PlyElement], ve
             f"the PLY file has {len(data)} bytes, its header promises {vertex.count} vertices; copy it again"
         )
     lines = [line for line in data[header.start :].decode("ascii", errors="replace").splitlines() if line.strip()]
+    own = lines[skipped : skipped + vertex.count]
+    if len(own) < vertex.count:
+        raise InputError(
+            f"the PLY file has {len(own)} lines of vertices, its header promises {vertex.count}; copy it again"
+        )
     record = np.dtype([(name, kind) for name, kind in vertex.properties])
     try:
-        rows = np.loadtxt(lines[skipped : skipped + vertex.count], dtype=record, ndmin=1)
+        return np.loadtxt(own, dtype=record, ndmin=1) if own else np.zeros(0, dtype=record)
     except (ValueError, OverflowError) as error:
         raise InputError(f"the PLY vertices are not readable ({error}); export it again") from error
-    if len(rows) < vertex.count:
-        raise InputError(
-            f"the PLY file has {len(rows)} lines of vertices, its header promises {vertex.count}; copy it again"
-        )
-    return rows
