@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from . import export as export
     from . import runtime as runtime
     from . import train as train
+    from .export.unwrapping import Unwrapped
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.meshfile import MeshLike
@@ -95,8 +96,10 @@ def unwrap(
     return unwrap_asset(load(mesh), options, progress)
 
 
-def unwrap_asset(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapResult:
-    """Train, finish, pack, measure, export.  Raises as `unwrap`."""
+def unwrap_asset(
+    asset: Asset, options: Options, progress: Progress | None = None, keep: tuple[Path, int] | None = None
+) -> UnwrapResult:
+    """Train, finish, pack, measure, export.  keep: folder and interval of checkpoints.  Raises as `unwrap`."""
     from .runtime.extras import requires
     from .runtime.progress import Clock
 
@@ -104,26 +107,46 @@ def unwrap_asset(asset: Asset, options: Options, progress: Progress | None = Non
         from .export.unwrapping import assemble, train_asset
 
     clock = Clock(progress)
-    found = assemble(asset, train_asset(asset, options, clock), options, clock)
-    return UnwrapResult(asset, found.charts, found.frame, found.atlas, found.model, found.onnx, found.report)
+    trained = train_asset(asset, options, clock, keep)
+    return UnwrapResult(asset, assemble(asset, trained, clock, size=options.size, padding=options.margin))
 
 
 @dataclass(frozen=True, eq=False)
 class UnwrapResult:
-    """An unwrapped mesh.
-
-    asset: the mesh as read and cleaned.  charts: flat, not packed.  frame: source units → unit ball.
-    atlas: packed charts.  model: the torch module behind the ONNX file.  onnx: the bytes of that file.
-    report: changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON.
-    """
+    """An unwrapped mesh.  asset: the mesh as read and cleaned.  found: what came of it."""
 
     asset: Asset
-    charts: Charts
-    frame: Frame
-    atlas: Atlas
-    model: AtlasNetworks
-    onnx: bytes = field(repr=False)
-    report: dict[str, Any] = field(repr=False)
+    found: Unwrapped = field(repr=False)
+
+    @property
+    def charts(self) -> Charts:
+        """Flat, not packed."""
+        return self.found.charts
+
+    @property
+    def frame(self) -> Frame:
+        """Source units → unit ball."""
+        return self.found.frame
+
+    @property
+    def atlas(self) -> Atlas:
+        """Packed charts."""
+        return self.found.atlas
+
+    @property
+    def model(self) -> AtlasNetworks:
+        """The torch module behind the ONNX file."""
+        return self.found.model
+
+    @property
+    def onnx(self) -> bytes:
+        """The bytes of the ONNX file."""
+        return self.found.onnx
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON."""
+        return self.found.report
 
     def save(
         self,
@@ -132,6 +155,7 @@ class UnwrapResult:
         maps: Sequence[str] = ("auto",),
         formats: Sequence[str] = ("glb",),
         preview: bool = True,
+        inverse: bool = False,
         force: bool = False,
         progress: Progress | None = None,
     ) -> tuple[Path, ...]:
@@ -146,19 +170,23 @@ class UnwrapResult:
         from .runtime.files import OutputFolder
         from .runtime.options import Outputs
 
-        outputs = Outputs(tuple(maps), tuple(formats), preview)
+        outputs = Outputs(tuple(maps), tuple(formats), preview, inverse=inverse).for_asset(self.asset)
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
-            check_outputs(output, outputs.for_asset(self.asset), self.atlas.size)
-            return self.write(output, outputs.for_asset(self.asset), progress)
+            check_outputs(output, outputs, self.atlas.size)
+            return self.write(output, outputs, progress)
 
     def write(self, output: OutputFolder, outputs: Outputs, progress: Progress | None = None) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder; outputs without "auto"."""
         from .bake.output import write_outputs
+        from .export.unwrapping import invert
         from .runtime.progress import Clock
 
-        clock = Clock(progress)
+        clock, report = Clock(progress), dict(self.report)
         output.write(f"{output.stem}.onnx", lambda path: path.write_bytes(self.onnx))
+        if outputs.inverse:
+            content, report["inverse"] = invert(self.asset, self.found, clock)
+            output.write(f"{output.stem}.wrap.onnx", lambda path: path.write_bytes(content))
         write_outputs(output, self.atlas, self.asset, outputs, clock)
-        seconds = {**self.report["seconds"], **{name: round(value, 3) for name, value in clock.seconds.items()}}
-        output.write_report({**self.report, "seconds": seconds})
+        seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
+        output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()

@@ -14,19 +14,22 @@ from typing import TYPE_CHECKING, Literal
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
-from . import __version__, load, unwrap_asset
+from . import UnwrapResult, __version__, load, unwrap_asset
 from .bake.commands import bake
 from .bake.output import check_maps, check_outputs
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Flag, Output, complain, names, show
-from .runtime.errors import FlexparaError
+from .runtime.errors import FlexparaError, InputError
+from .runtime.extras import requires
 from .runtime.options import Options, Outputs
-from .runtime.progress import progress_bars
+from .runtime.progress import Clock, progress_bars
+from .runtime.runfile import Run
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 INTERRUPTED = 130
+TRAINED = "trained.safetensors"
 app = App(
     name="flexpara",
     help="UV atlases with few charts and little distortion, an ONNX file that knows them, and baked textures.",
@@ -52,9 +55,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @app.command
 def unwrap(
-    mesh: Path,
+    mesh: Path | None = None,
     *,
-    output: Output,
+    output: Output | None = None,
     charts: int = 8,
     size: int = 2048,
     padding: int | None = None,
@@ -62,9 +65,17 @@ def unwrap(
     format: str = "glb",
     texture_format: Literal["png", "exr"] | None = None,
     normal_format: Literal["opengl", "directx"] = "opengl",
+    inverse: Flag = False,
+    preview: bool = True,
     seed: int = 0,
     preset: str = "fast",
-    preview: bool = True,
+    mode: str = "multi-chart",
+    steps: int | None = None,
+    width: int | None = None,
+    precision: str = "float32",
+    ablation: str = "none",
+    checkpoint_every: int | None = None,
+    resume: Path | None = None,
     quiet: Flag = False,
     force: Flag = False,
 ) -> int:
@@ -80,25 +91,163 @@ def unwrap(
         format: mesh files, comma-separated: glb, obj, ply
         texture_format: of all maps that can be stored so (default: each map's own)
         normal_format: green channel of the normal map: opengl (+Y) or directx (-Y)
+        inverse: also write STEM.wrap.onnx: uv and chart to point and normal
+        preview: draw STEM.preview.png
         seed: same seed, same machine, same bytes
-        preset: how much work training does: fast
+        preset: fast: seconds on a CPU; paper: trained as published, best on a GPU
+        mode: of preset paper: multi-chart or global (one chart)
+        steps: of preset paper (default: 10000)
+        width: channels of its hidden layers (default: 512)
+        precision: of its products: float32 or bfloat16
+        ablation: its parts left out or added, comma-separated: no-triangle, no-differential, no-upper, no-lower;
+            bidirectional, chart-differential
+        checkpoint_every: steps of preset paper between checkpoints
+        resume: output folder of a run with checkpoints that was cut short; takes no other options
+        quiet: no progress, no summary
+        force: overwrite files that flexpara did not write
+    """
+    if resume is not None:
+        from .runtime.runfile import find_run
+
+        return _perform(find_run(resume), quiet=quiet, force=force)
+    if mesh is None or output is None:
+        missing = "--mesh" if mesh is None else "--output"
+        raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
+    options = Options(charts, size, padding, seed, preset, mode, steps, width, precision, names(ablation))
+    outputs = Outputs(names(maps), names(format), preview, texture_format, normal_format, inverse)
+    run = Run(mesh.absolute(), output, options, outputs, checkpoint_every)
+    return _perform(run, quiet=quiet, force=force)
+
+
+def _perform(run: Run, *, quiet: bool, force: bool) -> int:
+    """One unwrap, from its beginning or its last checkpoint."""
+    from .runtime.files import OutputFolder
+
+    check_maps(run.outputs.maps)
+    asset = load(run.mesh)
+    outputs = run.outputs.for_asset(asset)
+    with OutputFolder(run.output, asset.stem, force=force, source=run.mesh) as folder:
+        check_outputs(folder, outputs, run.options.size)
+        run.save()
+        with progress_bars(quiet=quiet) as progress:
+            result = unwrap_asset(asset, run.options, progress, run.keep)
+            written = result.write(folder, outputs, progress)
+    run.forget()
+    if not quiet:
+        show({**result.report["metrics"], **result.report["network"]}, written)
+    return 0
+
+
+@app.command
+def train(
+    mesh: Path,
+    *,
+    output: Output,
+    charts: int = 8,
+    seed: int = 0,
+    preset: str = "fast",
+    mode: str = "multi-chart",
+    steps: int | None = None,
+    width: int | None = None,
+    precision: str = "float32",
+    ablation: str = "none",
+    quiet: Flag = False,
+    force: Flag = False,
+) -> int:
+    """The first half of unwrap: charts and networks, as STEM.trained.safetensors for flexpara export.
+
+    Args:
+        mesh: any file trimesh reads
+        output: folder for STEM.trained.safetensors and STEM.train.json
+        charts: the most charts a connected surface may get
+        seed: same seed, same machine, same bytes
+        preset: fast: seconds on a CPU; paper: trained as published, best on a GPU
+        mode: of preset paper: multi-chart or global (one chart)
+        steps: of preset paper (default: 10000)
+        width: channels of its hidden layers (default: 512)
+        precision: of its products: float32 or bfloat16
+        ablation: its parts left out or added, see unwrap
+        quiet: no progress, no summary
+        force: overwrite files that flexpara did not write
+    """
+    options = Options(
+        charts=charts,
+        seed=seed,
+        preset=preset,
+        mode=mode,
+        steps=steps,
+        width=width,
+        precision=precision,
+        ablation=names(ablation),
+    )
+    from .runtime.files import OutputFolder
+
+    asset = load(mesh)
+    name = f"{asset.stem}.{TRAINED}"
+    with OutputFolder(output, asset.stem, force=force, source=mesh, report=f"{asset.stem}.train.json") as folder:
+        folder.check([name, folder.report_name])
+        with requires("train"):
+            from .export.unwrapping import train_asset
+            from .train.saved import to_bytes
+        with progress_bars(quiet=quiet) as progress:
+            trained = train_asset(asset, options, Clock(progress))
+        folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
+        source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
+        facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}
+        folder.write_report(facts)
+        written = folder.commit()
+    if not quiet:
+        show({}, written)
+    return 0
+
+
+@app.command
+def export(
+    trained: Path,
+    mesh: Path,
+    *,
+    output: Output,
+    size: int = 2048,
+    padding: int | None = None,
+    maps: str = "none",
+    format: str = "glb",
+    inverse: Flag = False,
+    preview: bool = True,
+    quiet: Flag = False,
+    force: Flag = False,
+) -> int:
+    """The second half of unwrap: pack what flexpara train found, export the ONNX file, write the mesh, bake.
+
+    Args:
+        trained: STEM.trained.safetensors
+        mesh: the mesh it was trained on
+        output: folder for what unwrap writes
+        size: atlas side, texels
+        padding: texels kept free around each chart (default: size / 256, at least 2)
+        maps: comma-separated, see unwrap
+        format: mesh files, comma-separated: glb, obj, ply
+        inverse: also write STEM.wrap.onnx: uv and chart to point and normal
         preview: draw STEM.preview.png
         quiet: no progress, no summary
         force: overwrite files that flexpara did not write
     """
-    options = Options(charts=charts, size=size, padding=padding, seed=seed, preset=preset)
-    outputs = Outputs(names(maps), names(format), preview, texture_format, normal_format)
+    options = Options(size=size, padding=padding)
+    outputs = Outputs(names(maps), names(format), preview, inverse=inverse)
     check_maps(outputs.maps)
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
+    outputs = outputs.for_asset(asset)
     with OutputFolder(output, asset.stem, force=force, source=mesh) as folder:
-        check_outputs(folder, outputs.for_asset(asset), size)
+        check_outputs(folder, outputs, size)
+        with requires("train"):
+            from .export.unwrapping import assemble
+            from .train.saved import read_trained
         with progress_bars(quiet=quiet) as progress:
-            result = unwrap_asset(asset, options, progress)
-            written = result.write(folder, outputs.for_asset(asset), progress)
+            found = assemble(asset, read_trained(trained, asset), Clock(progress), size=size, padding=options.margin)
+            written = UnwrapResult(asset, found).write(folder, outputs, progress)
     if not quiet:
-        show({**result.report["metrics"], **result.report["network"]}, written)
+        show({**found.report["metrics"], **found.report["network"]}, written)
     return 0
 
 

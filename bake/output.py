@@ -44,7 +44,8 @@ def check_outputs(output: OutputFolder, outputs: Outputs, size: int, *, meshes: 
     """
     names = list(texture_files(output.stem, outputs).values())
     if meshes:
-        names += [f"{output.stem}.{name}" for name in (*outputs.formats, "onnx")]
+        endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
+        names += [f"{output.stem}.{ending}" for ending in endings]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
     output.check([*names, output.report_name])
     wanted = {"baker": bool(outputs.maps), "gltf": meshes and "glb" in outputs.formats, "preview": outputs.preview}

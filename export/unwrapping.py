@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..runtime.agreement import agreement
+from ..runtime.mesh import Surface
 from ..runtime.metrics import measure
 from ..runtime.packing import pack
 from ..runtime.session import UnwrapSession
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.options import Options
     from ..runtime.progress import Clock
-    from ..train.checkpoint import Checkpoints
     from ..train.networks import AtlasNetworks
     from ..train.pipeline import Trained
+
+    Keep = tuple[Path, int]
 
 REPORT_VERSION = 1
 
@@ -50,38 +52,35 @@ class Unwrapped:
     report: dict[str, Any] = field(repr=False)
 
 
-def train_asset(asset: Asset, options: Options, clock: Clock, checkpoints: Checkpoints | None = None) -> Trained:
-    """Charts and networks by the preset asked for.  checkpoints: of preset paper; None keeps none.
+def train_asset(asset: Asset, options: Options, clock: Clock, keep: Keep | None = None) -> Trained:
+    """Charts and networks by the preset asked for.  keep: where and how often preset paper keeps checkpoints.
 
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
     if options.preset == "paper":
+        from ..train.checkpoint import Checkpoints
         from ..train.paper.pipeline import train_paper_surface
 
+        checkpoints = None if keep is None else Checkpoints(*keep)
         return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints)
     return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
 
 
-def assemble(asset: Asset, trained: Trained, options: Options, clock: Clock) -> Unwrapped:
+def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding: int) -> Unwrapped:
     """Pack, measure, export.
 
     Raises: ParityError when the exported network and torch disagree.
     """
     with clock.stage("pack"):
-        atlas = pack(asset, trained.charts, size=options.size, padding=options.margin, seed=options.seed)
+        atlas = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"])
     with clock.stage("measure"):
-        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=options.size)
+        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
     report: dict[str, Any] = {
         "format_version": REPORT_VERSION,
         "version": __version__,
         "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
         "changes": asset.changes,
-        "settings": {
-            **trained.settings,
-            "size": options.size,
-            "padding": options.margin,
-            "preset": options.preset,
-        },
+        "settings": {**trained.settings, "size": size, "padding": padding},
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),
         "train": trained.report,
@@ -90,7 +89,7 @@ def assemble(asset: Asset, trained: Trained, options: Options, clock: Clock) -> 
         path = Path(folder) / "atlas.onnx"
         facts = Provenance(asset.sha256, report["settings"], report["metrics"])
         parity = export_onnx(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
-        network = agreement(UnwrapSession(path), atlas, seed=options.seed)
+        network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
@@ -118,3 +117,23 @@ def paper_config(options: Options) -> PaperConfig:
             chart_differential="chart-differential" in names,
         ),
     )
+
+
+def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[str, Any]]:
+    """The inverse map uv, chart → point, normal as an ONNX file's bytes, and how well it agrees with the surface.
+
+    Raises: ParityError when the exported network and torch disagree.
+    """
+    from ..runtime.wrapagreement import inverse_agreement
+    from ..runtime.wrapsession import WrapSession
+    from ..train.fit_wrap import fit_wrap
+    from .wrap import export_wrap
+
+    ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)
+    model = fit_wrap(ball, found.charts, seed=found.report["settings"]["seed"], progress=clock)
+    with clock.stage("export inverse"), TemporaryDirectory() as folder:
+        path = Path(folder) / "atlas.wrap.onnx"
+        facts = Provenance(asset.sha256, found.report["settings"], found.report["metrics"])
+        export_wrap(model, found.frame, found.atlas, found.charts, path, metadata=facts)
+        agreed = inverse_agreement(WrapSession(path), asset.surface, found.atlas)
+        return path.read_bytes(), agreed.to_dict()

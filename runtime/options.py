@@ -68,10 +68,8 @@ class Options:
             _demand(value is None or value >= 1, f"{name} is {value}, expected 1 or more; leave --{name} out")
         for name in ("mode", "steps", "width", "precision", "ablation"):
             value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
-            _demand(
-                self.preset == "paper" or value == default,
-                f"{name} is {value!r}, expected {default!r} with preset {self.preset}; add --preset paper, or leave it out",
-            )
+            found = f"{name} is {value!r}, expected {default!r} with preset {self.preset}"
+            _demand(self.preset == "paper" or value == default, f"{found}; add --preset paper, or leave it out")
 
     @property
     def margin(self) -> int:
@@ -87,6 +85,7 @@ class Outputs:
     formats: of "glb", "obj", "ply", at least one.  preview: whether the preview picture is drawn.
     texture_format: for all maps that can be stored so; None is each map's own.
     normal_format: green channel of the normal map, "opengl" (+Y) or "directx" (−Y).
+    inverse: whether the inverse map, `<stem>.wrap.onnx`, is made.
 
     Raises: InputError for an unknown format.
     """
@@ -96,6 +95,7 @@ class Outputs:
     preview: bool = True
     texture_format: Literal["png", "exr"] | None = None
     normal_format: Literal["opengl", "directx"] = "opengl"
+    inverse: bool = False
 
     def __post_init__(self) -> None:
         found, known = ", ".join(self.formats), ", ".join(FORMATS)

@@ -63,7 +63,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
             charts=Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",)),
             networks=AtlasNetworks(1, NetConfig(), generator=torch.Generator().manual_seed(0)),
             frame=Frame.of(surface.vertices),
-            settings=asdict(settings),
+            settings={"preset": "fast", **asdict(settings)},
             report={},
         )
 

@@ -159,6 +159,7 @@ class AtlasNetworks(nn.Module):
 
     def __init__(self, patches: int, config: NetConfig, *, generator: torch.Generator) -> None:
         super().__init__()
+        self.config = config
         self.features = FourierFeatures(config.octaves)
         self.unwrap_features = FourierFeatures(config.unwrap_octaves)
         wide, width = config.assign_width, config.width

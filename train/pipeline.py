@@ -72,7 +72,7 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
         "slit_length": sum(piece.slits for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
-    return Trained(charts, networks, frame, asdict(config), report)
+    return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
 
 
 def in_turn(progress: Progress) -> Callable[[str], None]:

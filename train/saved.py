@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset
 
 FORMAT = "flexpara-trained-1"
-ENDING = "trained.safetensors"
 LARGEST = 1 << 33
 """Bytes of a file that is read."""
 WIDEST = 4096
@@ -43,8 +42,8 @@ CHARTS = {
 }
 
 
-def to_bytes(trained: Trained, net: NetConfig, source_sha256: str) -> bytes:
-    """The file's content.  net: sizes of the networks; source_sha256: of the mesh they were trained on."""
+def to_bytes(trained: Trained, source_sha256: str) -> bytes:
+    """The file's content.  source_sha256: of the mesh that was trained on."""
     tensors = {
         f"charts.{name}": torch.from_numpy(np.ascontiguousarray(getattr(trained.charts, name))) for name in CHARTS
     }
@@ -55,7 +54,7 @@ def to_bytes(trained: Trained, net: NetConfig, source_sha256: str) -> bytes:
         "source_sha256": source_sha256,
         "methods": list(trained.charts.method),
         "frame": {"centre": list(trained.frame.centre), "scale": trained.frame.scale},
-        "net": asdict(net),
+        "net": asdict(trained.networks.config),
         "settings": trained.settings,
         "report": trained.report,
     }

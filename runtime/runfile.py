@@ -1,0 +1,116 @@
+"""A run that may be killed and resumed: what was asked for, kept as JSON beside its checkpoints.
+
+The folder `<output>/<stem>.checkpoint/` holds `run.json` and what training writes there; it goes when the run is done.
+A file may come from anywhere: its values pass the same checks as those of the command line.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError, MissingFileError
+from .options import Options, Outputs
+
+FOLDER = ".checkpoint"
+NAME = "run.json"
+FORMAT = "flexpara-run-1"
+LARGEST = 1 << 20
+
+
+@dataclass(frozen=True)
+class Run:
+    """One `flexpara unwrap`.  mesh, output: absolute paths.  every: steps between checkpoints, None keeps none."""
+
+    mesh: Path
+    output: Path
+    options: Options
+    outputs: Outputs
+    every: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse checkpoints where none are made (InputError)."""
+        if self.every is not None and (self.every < 1 or self.options.preset != "paper"):
+            raise InputError(
+                f"checkpoint-every is {self.every} with preset {self.options.preset}, expected 1 or more with preset "
+                "paper; leave it out"
+            )
+
+    @property
+    def keep(self) -> tuple[Path, int] | None:
+        """Folder and interval of the checkpoints."""
+        return None if self.every is None else (self.folder, self.every)
+
+    @property
+    def folder(self) -> Path:
+        """Where checkpoints are kept."""
+        return self.output / f"{self.mesh.stem}{FOLDER}"
+
+    def save(self) -> None:
+        """Write `run.json`, whole, if checkpoints are kept.  Raises: InputError for a folder not to be written to."""
+        if self.every is None:
+            return
+        facts = {
+            "format": FORMAT,
+            "mesh": str(self.mesh),
+            "output": str(self.output),
+            "options": asdict(self.options),
+            "outputs": asdict(self.outputs),
+            "every": self.every,
+        }
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            partial = self.folder / f".{NAME}.partial"
+            partial.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+            partial.replace(self.folder / NAME)
+        except OSError as error:
+            raise InputError(f"can't write to {self.folder} ({error.strerror}); choose another -o") from error
+
+    def forget(self) -> None:
+        """Remove the folder of checkpoints."""
+        if self.every is not None and (self.folder / NAME).is_file():
+            shutil.rmtree(self.folder)
+
+
+def find_run(output: Path) -> Run:
+    """The one run that was cut short in an output folder.
+
+    Raises:
+        MissingFileError: none.
+        InputError: more than one, or a damaged `run.json`.
+    """
+    found = sorted(output.glob(f"*{FOLDER}/{NAME}")) if output.is_dir() else []
+    if not found:
+        raise MissingFileError(f"{output} holds no run to resume, expected the -o of one that kept checkpoints")
+    if len(found) > 1:
+        names = ", ".join(path.parent.name for path in found)
+        raise InputError(f"{output} holds {len(found)} runs ({names}), expected one; move the others away")
+    return read_run(found[0], output)
+
+
+def read_run(path: Path, output: Path) -> Run:
+    """What `Run.save` wrote; the output folder may have been moved since."""
+    if path.stat().st_size > LARGEST:
+        raise InputError(f"{path} has {path.stat().st_size} bytes, expected at most {LARGEST}; start the run anew")
+    try:
+        facts: dict[str, Any] = json.loads(path.read_bytes())
+        if facts["format"] != FORMAT:
+            raise InputError(
+                f"{path}: format is {str(facts['format'])[:60]!r}, expected {FORMAT!r}; start the run anew"
+            )
+        options, outputs = (
+            {name: tuple(value) if isinstance(value, list) else value for name, value in facts[part].items()}
+            for part in ("options", "outputs")
+        )
+        every = None if facts["every"] is None else int(facts["every"])
+        run = Run(Path(facts["mesh"]), output.absolute(), Options(**options), Outputs(**outputs), every)
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path} is damaged ({error}), expected what flexpara wrote; start the run anew") from error
+    if f"{run.mesh.stem}{FOLDER}" != path.parent.name:
+        raise InputError(f"{path} names {run.mesh.name}, expected the mesh of {path.parent.name}; start the run anew")
+    return run
