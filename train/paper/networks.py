@@ -30,17 +30,32 @@ class Affine(Dense):
         with torch.no_grad():
             self.bias.copy_((torch.rand(self.bias.shape, generator=generator) * 2.0 - 1.0) * bound)
 
-    def run(self, x: Tensor) -> Tensor:
-        """(…, n, c_in) → (…, n, c_out) in x's dtype, bias included in the product."""
-        weight, bias = self.weight.to(x.dtype), self.bias.to(x.dtype)
+    def run(self, x: Tensor, dtype: torch.dtype) -> Tensor:
+        """(…, n, c_in) → (…, n, c_out) in ``dtype``, bias included in the product."""
+        x, weight = in_precision(x, self.weight, dtype)
+        bias = self.bias.to(dtype)
         if weight.ndim == 2:
             return torch.addmm(bias, x, weight) if x.ndim == 2 else x @ weight + bias
         return torch.baddbmm(bias, x.expand(weight.shape[0], -1, -1), weight)
 
-    def run_jet(self, x: Tensor) -> Tensor:
+    def run_jet(self, x: Tensor, dtype: torch.dtype) -> Tensor:
         """The same on jets (3, …, n, c): only the value gets the bias."""
-        bias = self.bias.to(x.dtype)
-        return x @ self.weight.to(x.dtype) + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+        x, weight = in_precision(x, self.weight, dtype)
+        bias = self.bias.to(dtype)
+        return x @ weight + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+
+
+def in_precision(x: Tensor, weight: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """x and weight, whose product has the precision of x, in ``dtype``.
+
+    float32 coordinates that meet bfloat16 are split into a rounded part and the rest, and so are the weights:
+    [x₁, x₂, x₁] [W₁; W₁; W₂] is exact to 2⁻¹⁶, and sums in float32.
+    """
+    if x.dtype == dtype or dtype != torch.bfloat16:
+        return x.to(dtype), weight.to(dtype)
+    near, weight_near = x.to(dtype), weight.to(dtype)
+    rest, weight_rest = (x - near.float()).to(dtype), (weight - weight_near.float()).to(dtype)
+    return torch.cat([near, rest, near], dim=-1), torch.cat([weight_near, weight_near, weight_rest], dim=-2)
 
 
 class LeakyPerceptron(nn.Module):
@@ -61,28 +76,31 @@ class LeakyPerceptron(nn.Module):
 
     def run(self, x: Tensor, dtype: torch.dtype, *, features: bool = False) -> Tensor:
         """As forward, hidden products in ``dtype``; ``features``: the output is no coordinate, so it stays in dtype."""
-        first, *inner, last = self._affine()
-        x = leaky_relu(first.run(x).to(dtype), self.slope)
+        *inner, last = self._affine()
         for layer in inner:
-            x = leaky_relu(layer.run(x), self.slope)
-        return last.run(x if features else x.float() if dtype == torch.bfloat16 else x)
+            x = leaky_relu(layer.run(x, dtype), self.slope, inplace=True)
+        return last.run(x, dtype if features else _exact(dtype))
 
     def jet(self, x: Tensor, dtype: torch.dtype, *, features: bool = False) -> Tensor:
         """As run, on jets (3, …, n, c)."""
-        first, *inner, last = self._affine()
-        x = leaky_jet(first.run_jet(x).to(dtype), self.slope)
+        *inner, last = self._affine()
         for layer in inner:
-            x = leaky_jet(layer.run_jet(x), self.slope)
-        return last.run_jet(x if features else x.float() if dtype == torch.bfloat16 else x)
+            x = leaky_jet(layer.run_jet(x, dtype), self.slope)
+        return last.run_jet(x, dtype if features else _exact(dtype))
 
     def _affine(self) -> list[Affine]:
         return [layer for layer in self.layers if isinstance(layer, Affine)]
 
 
+def _exact(dtype: torch.dtype) -> torch.dtype:
+    """What coordinates are made in."""
+    return torch.float32 if dtype == torch.bfloat16 else dtype
+
+
 def leaky_jet(x: Tensor, slope: float) -> Tensor:
-    """LeakyReLU of a jet: value and tangents times 1 where the value is positive, else times ``slope``."""
+    """LeakyReLU of a jet, in place: value and tangents times 1 where the value is positive, else times ``slope``."""
     gain = (x[:1].detach() > 0.0).to(x.dtype).mul_(1.0 - slope).add_(slope)
-    return x * gain
+    return x.mul_(gain)
 
 
 class CodedPerceptron(nn.Module):
