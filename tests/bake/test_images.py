@@ -168,3 +168,15 @@ def test_other_endings_and_unreadable_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "b.png").write_bytes(b"no image")
     with pytest.raises(InputError, match=r"b\.png"):
         read_image(tmp_path / "b.png")
+
+
+def test_a_tall_picture_is_dithered_as_one() -> None:
+    """Rows are quantized in bands: the pattern and the values go on across them."""
+    pixels = np.random.default_rng(6).random((300, 9, 3)).astype(np.float32)
+    expected = np.clip(np.floor(pixels * np.float32(255) + bayer_threshold(300, 9)[..., None]), 0, 255)
+    np.testing.assert_array_equal(quantize(texture(pixels, "unit", dither=True)), expected)
+
+
+def test_an_exr_holds_no_clock(tmp_path: Path) -> None:
+    write_exr(texture(noise(3), "linear", 32), tmp_path / "a.exr")
+    assert b"1970:01:01" in (tmp_path / "a.exr").read_bytes()

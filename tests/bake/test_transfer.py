@@ -64,7 +64,7 @@ def renders(atlas: Atlas, asset: Asset, pixels: int) -> dict[str, np.ndarray]:
         "normal": object_normal_map(),
     }
     drawn = {name: compute(buffer, screen, shown) for name, compute in maps.items()}
-    found = {name: image.reshape(-1, image.shape[-1])[buffer.texels] for name, image in drawn.items()}
+    found: dict[str, Any] = {name: image.reshape(-1, image.shape[-1])[buffer.texels] for name, image in drawn.items()}
     found["normal"] = found["normal"] * 0.5 + 0.5
     for name in ("base-color", "emissive"):
         found[name] = srgb_exact(np.clip(found[name][:, :3], 0.0, 1.0))
@@ -74,7 +74,7 @@ def renders(atlas: Atlas, asset: Asset, pixels: int) -> dict[str, np.ndarray]:
 def rebaked(atlas: Atlas, asset: Asset, size: int) -> Asset:
     """The asset as a reader of the written files has it: 8-bit textures on the new uv."""
     textures = bake(atlas, asset, ["base-color", "metallic-roughness", "occlusion", "emissive", "normal"], size=size)
-    pictures: dict[str, Any] = {}
+    pictures: Any = {}
     for name, texture in textures.items():
         pixels = quantize(texture, bits=8)
         rgb = np.broadcast_to(pixels, (*pixels.shape[:2], 3)) if pixels.shape[2] == 1 else pixels
