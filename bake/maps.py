@@ -16,9 +16,12 @@ import numpy as np
 from ..runtime.errors import InputError
 from .checker import uv_card
 from .color import chart_colors
+from .curvature import curvature_map
 from .marks import distortion_map, face_id_map, material_id_map, orm_map
 from .material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
 from .normals import FLAT, NormalFormat, object_normal_map, tangent_normal_map
+from .raymaps import ao_map, bent_normal_map, bent_normal_object_map, height_map, thickness_map
+from .rays import RaySettings
 from .resample import linear_colors
 
 if TYPE_CHECKING:
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
 
 NORMAL_FORMATS: tuple[NormalFormat, ...] = ("opengl", "directx")
 
-BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+BLACK, GREY, WHITE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
 RANGE_01, RANGE_11 = "[0, 1]", "[-1, 1]"
 
 Compute = Callable[["GBuffer", "Atlas", "Asset"], "NDArray[np.float32]"]
@@ -119,16 +122,19 @@ def without_opaque_alpha(color: NDArray[np.float32], gbuffer: GBuffer) -> NDArra
     return color if (alpha < 1.0 - 1.0 / 510.0).any() else np.ascontiguousarray(color[..., :3])
 
 
-def all_maps(normal_format: NormalFormat = "opengl") -> dict[str, BakeMap]:
+def all_maps(normal_format: NormalFormat = "opengl", rays: RaySettings | None = None) -> dict[str, BakeMap]:
     """Every map by name, in the order they are listed to users.
 
+    rays: how those are cast that need any.
     Raises: InputError for another normal format than opengl or directx.
     """
     if normal_format not in NORMAL_FORMATS:
         raise InputError(f"normal format {normal_format!r}: expected one of {', '.join(NORMAL_FORMATS)}")
     up = "tangent, Y up" if normal_format == "opengl" else "tangent, Y down"
     tangent = tangent_normal_map(normal_format)
-    color, part = "linear light", "share"
+    color, part, unit = "linear light", "share", "unit vector"
+    rays = rays or RaySettings()
+    bent, bent_object = bent_normal_map(rays, normal_format), bent_normal_object_map(rays)
     maps = (
         BakeMap("normal", up, "unit vector", RANGE_11, "signed", "png", 8, tangent, FLAT, dither=True),
         BakeMap("normal-object", "object", "unit vector", RANGE_11, "signed", "exr", 16, object_normal_map(), BLACK),
@@ -143,6 +149,12 @@ def all_maps(normal_format: NormalFormat = "opengl") -> dict[str, BakeMap]:
         BakeMap("emissive", "none", color, RANGE_01, "srgb", "png", 8, emissive_map(), BLACK),
         BakeMap("face-id", "none", "face number", "whole", "linear", "exr", 32, face_id_map, (-1, -1, -1)),
         BakeMap("material-id", "none", color, RANGE_01, "srgb", "png", 8, material_id_map, BLACK),
+        BakeMap("ao", "none", part, RANGE_01, "unit", "png", 8, ao_map(rays), WHITE, dither=True),
+        BakeMap("bent-normal", up, unit, RANGE_11, "signed", "png", 8, bent, FLAT, dither=True),
+        BakeMap("bent-normal-object", "object", unit, RANGE_11, "signed", "exr", 16, bent_object, BLACK),
+        BakeMap("thickness", "none", "radii", RANGE_01, "unit", "png", 8, thickness_map(rays), BLACK, dither=True),
+        BakeMap("curvature", "none", "shaped", RANGE_01, "unit", "png", 8, curvature_map(), GREY, dither=True),
+        BakeMap("height", "ray", "source units", "any", "linear", "exr", 32, height_map, BLACK),
         BakeMap("distortion", "none", color, RANGE_01, "srgb", "png", 8, distortion_map(), BLACK),
     )
     return {entry.name: entry for entry in maps}
@@ -151,12 +163,12 @@ def all_maps(normal_format: NormalFormat = "opengl") -> dict[str, BakeMap]:
 MAP_NAMES = tuple(all_maps())
 
 
-def find_map(name: str, *, normal_format: NormalFormat = "opengl") -> BakeMap:
-    """The map of that name.
+def find_map(name: str, *, normal_format: NormalFormat = "opengl", rays: RaySettings | None = None) -> BakeMap:
+    """The map of that name.  normal_format, rays: see `all_maps`.
 
     Raises: InputError that lists the names there are.
     """
-    maps = all_maps(normal_format)
+    maps = all_maps(normal_format, rays)
     if name not in maps:
         raise InputError(f"unknown map {name!r}: expected one of {', '.join(maps)}")
     return maps[name]
