@@ -20,6 +20,7 @@ from .gutter import find_gutter
 from .images import Texture, write_texture
 from .layout import check_size
 from .maps import BakeMap, NormalFormat, find_map
+from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_changes, seam_error
 from .tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 SurfaceFunction = Callable[["NDArray[np.float32]", "NDArray[np.float32]", "NDArray[np.int64]"], "ArrayLike"]
 
+VISIBLE = 0.5 / 255.0
+"""Difference across a seam, as a share of a map's range, up to which gutters stay as they are."""
 WRITERS = 2
 """Files encoded at once: each holds a whole image in memory."""
 
@@ -92,9 +95,10 @@ def bake(
     pixels: dict[str, NDArray[np.float32]] = {}
     if drawn:
         with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
-            covered = np.zeros((texels, texels), np.bool_)
+            covered, inside = np.zeros((2, texels, texels), np.bool_)
             for baked in map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress):
                 covered[baked.window.rows, baked.window.columns] = baked.covered
+                inside[baked.window.rows, baked.window.columns] = baked.inside
                 for entry in drawn:
                     part = baked.maps[entry.name]
                     image = pixels[entry.name] = with_channels(pixels.get(entry.name), part.shape[2], texels)
@@ -105,6 +109,8 @@ def bake(
         if padding is None:
             gutter = find_gutter(covered, None)
             pixels = {name: gutter.fill(image, image[0, 0]) for name, image in pixels.items()}
+        if padding != 0 and tile is None:
+            close_seams(atlas, drawn, pixels, inside)
     for entry in chosen:
         if entry.everywhere:
             _announce(progress, entry.name)
@@ -152,6 +158,12 @@ def surface_alone(atlas: Atlas) -> Asset:
     )
 
 
+def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int32]:
+    """(size, size) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.bleed_free_mip` takes."""
+    labels = bake(atlas, {"chart": lambda _, __, face: atlas.face_chart[face] + 1}, size=size, padding=padding)
+    return labels["chart"].pixels[..., 0].astype(np.int32) - 1
+
+
 def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
     """Rasterize in a context of its own.  Raises as `open_context` and `rasterize`."""
     check_size(size)
@@ -169,6 +181,24 @@ def with_channels(image: NDArray[np.float32] | None, channels: int, size: int) -
     if image.shape[2] >= channels:
         return image
     return np.concatenate([image, np.ones((size, size, channels - image.shape[2]), np.float32)], axis=2)
+
+
+def close_seams(
+    atlas: Atlas, entries: Sequence[BakeMap], pixels: Mapping[str, NDArray[np.float32]], inside: NDArray[np.bool_]
+) -> None:
+    """Where the two sides of seams differ visibly, move the texels beside charts, in place, so that they agree."""
+    entries = [entry for entry in entries if agrees_across_seams(entry.name, entry.space)]
+    seams = find_seams(atlas) if entries else np.zeros((0, 2, 2, 2))
+    if len(seams) == 0:
+        return
+    samples = sample_seams(seams, len(inside))
+    for entry in entries:
+        image = pixels[entry.name]
+        error = seam_error(as_texture(entry, image), samples)
+        if error is not None and error.maximum > VISIBLE:
+            texel, change = seam_changes(image, samples, inside)
+            row, column = np.divmod(texel, len(inside))
+            image[row, column] += change
 
 
 def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 REACH = 0.71
 """Texels; a little over √½."""
+EDGE = 1e-6
+"""Least barycentric weight of a point inside a face."""
 CHUNK = 1 << 18
 """Texels interpolated at once: bounds the memory of temporaries."""
 GROWTH = 1.0 / 16.0
@@ -89,6 +91,12 @@ class GBuffer:
     def texels(self) -> NDArray[np.int64]:
         """(t,) int64 flat indices of the texels that hold a surface, ascending."""
         return np.flatnonzero(self.face.reshape(-1) >= 0)
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """(h, w) bool: texels whose centres lie in a face, not merely near the border of a chart."""
+        least = np.minimum(np.minimum(self.second, self.third), 1.0 - self.second - self.third)
+        return (self.face >= 0) & (least > EDGE)
 
     def image_texels(self, texels: NDArray[np.int64]) -> NDArray[np.int64]:
         """(t,) int64 flat indices in the whole image of flat indices in this window: seeds that no window changes."""

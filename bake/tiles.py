@@ -157,19 +157,22 @@ def map_windows(
             if progress is not None and number == 0:
                 progress(entry.name)
             maps[entry.name] = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
-        yield BakedWindow(window, covered[rows, columns], find_gutter(covered, plan.halo).part(rows, columns), maps)
+        inside = gbuffer.inside if plan.along == 1 else ~covered_texels(~gbuffer.inside, plan.along)
+        gutter = find_gutter(covered, plan.halo).part(rows, columns)
+        yield BakedWindow(window, covered[rows, columns], inside[rows, columns], gutter, maps)
 
 
 @dataclass(frozen=True, eq=False)
 class BakedWindow:
     """The maps of a window.
 
-    covered: (h, w) bool, which texels hold a surface.  maps: name → pixels of the window with its halo, before gutters;
-    gutter.fill takes the halo off.
+    covered: (h, w) bool, which texels hold a surface.  inside: (h, w) bool, those whose samples all lie in faces.
+    maps: name → pixels of the window with its halo, before gutters; gutter.fill takes the halo off.
     """
 
     window: Window
     covered: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
     gutter: GutterPart
     maps: dict[str, NDArray[np.float32]]
 

@@ -1,0 +1,220 @@
+"""Seams under bilinear filtering: how far the two sides differ, and gutters that make them agree.
+
+f faces · e seam edges · s samples along them · g texels that may change · c channels.  A seam edge is one edge of the
+surface that lies in uv twice.  Sampled through either chart it should give one value; bilinear filtering mixes texels
+inside the chart, which are right, with texels beside it, which are extrapolated.  Those beside it are free to choose:
+here such that both sides give the same, by least squares, each moved as little as possible.
+
+Creases (the normals of the two sides differ) are left out: what depends on the normal differs there by right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from .layout import border_edges
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ..runtime.mesh import Atlas
+    from .images import Texture
+
+PER_TEXEL = 2.0
+"""Samples per texel of a seam's length."""
+SMOOTH = 1e-3
+"""Normals of the two sides that differ by less are one normal."""
+WELD = 1e-8
+"""Share of the mesh's extent by which one point of a seam may differ from side to side."""
+HOLD = 1e-4
+"""Weight of staying where one is, beside a weight of 1 for a sample's two sides to agree."""
+PER_FACE = frozenset({"chart", "face-id", "material-id", "distortion"})
+"""Maps that jump from face to face."""
+
+
+@dataclass(frozen=True)
+class SeamError:
+    """Differences between the two sides of seams, as shares of the map's range (1/255 is one step of 8 bits).
+
+    maximum, p99: over the samples.  samples: how many there were.
+    """
+
+    maximum: float
+    p99: float
+    samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class SeamSamples:
+    """Bilinear footprints of points on seams, from either side.
+
+    texel: (s, 8) int64 flat texels, four of the one side, four of the other.  weight: (s, 8) float64, each four sum
+    to 1, those of the other side to −1: the product with the texels' values is the difference of the sides.
+    """
+
+    texel: NDArray[np.int64]
+    weight: NDArray[np.float64]
+
+    def differences(self, pixels: NDArray[np.float32]) -> NDArray[np.float64]:
+        """(s, c) differences of the sides in an image (h, w, c)."""
+        flat = pixels.reshape(-1, pixels.shape[2])
+        return np.einsum("sj,sjc->sc", self.weight, flat[self.texel])
+
+
+def agrees_across_seams(name: str, space: str) -> bool:
+    """Whether a map of that name and space is one function of the surface, the same on both sides of a seam."""
+    return not (name in PER_FACE or space.startswith(("tangent", "uv")))
+
+
+def find_seams(atlas: Atlas) -> NDArray[np.float64]:
+    """(e, 2, 2, 2) float64 uv: edge, side, end.  Both sides run the same way along the edge; creases are left out."""
+    face, corner = border_edges(atlas.faces, atlas.uv).T.astype(np.int64)
+    ends = np.stack([atlas.faces[face, corner], atlas.faces[face, (corner + 1) % 3]], axis=1)
+    extent = float(np.ptp(atlas.positions, axis=0).max()) or 1.0
+    _, welded = np.unique(np.round(atlas.positions / (WELD * extent)), axis=0, return_inverse=True)
+    joint = welded.reshape(-1)[ends]
+    turned = joint[:, 0] > joint[:, 1]
+    ends[turned], joint[turned] = ends[turned][:, ::-1], joint[turned][:, ::-1]
+    key = joint[:, 0] * (len(atlas.positions) + 1) + joint[:, 1]
+    order = np.argsort(key, kind="stable")
+    _, start, count = np.unique(key[order], return_index=True, return_counts=True)
+    pair = np.stack([ends[order[start[count == 2]]], ends[order[start[count == 2] + 1]]], axis=1)
+    uv, normal = atlas.uv[pair].astype(np.float64), atlas.normals[pair]
+    smooth = np.abs(normal[:, 0] - normal[:, 1]).max(axis=(1, 2), initial=0.0) < SMOOTH
+    return uv[smooth & (uv[:, 0] != uv[:, 1]).any(axis=(1, 2))]
+
+
+def sample_seams(seams: NDArray[np.float64], size: int) -> SeamSamples:
+    """Samples along seams (e, 2, 2, 2) in an image of size × size, evenly, at least two an edge."""
+    length = np.linalg.norm(seams[:, :, 1] - seams[:, :, 0], axis=2).max(axis=1, initial=0.0) * size
+    edge, place = _along(length)
+    uv = seams[edge, :, 0] + place[:, None, None] * (seams[edge, :, 1] - seams[edge, :, 0])
+    sides = [footprint(uv[:, side], size) for side in (0, 1)]
+    texel = np.concatenate([side[0] for side in sides], axis=1)
+    return SeamSamples(texel, np.concatenate([sides[0][1], -sides[1][1]], axis=1))
+
+
+def footprint(uv: NDArray[np.float64], size: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(s, 4) flat texels and their bilinear weights at uv (s, 2), v up; the image's rim is repeated outwards."""
+    x, y = uv[:, 0] * size - 0.5, (1.0 - uv[:, 1]) * size - 0.5
+    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    across, down = x - left, y - top
+    columns = [np.clip(left + i, 0, size - 1) for i in (0, 1)]
+    rows = [np.clip(top + i, 0, size - 1) for i in (0, 1)]
+    texel = np.stack([row * size + column for row in rows for column in columns], axis=1)
+    weight = np.stack([a * b for a in (1.0 - down, down) for b in (1.0 - across, across)], axis=1)
+    return texel, weight
+
+
+def seam_error(texture: Texture, samples: SeamSamples) -> SeamError | None:
+    """How far the sides differ in a texture; None without seams.
+
+    The range is 1 or 2 where the map has one, else that of the texels at the seams.
+    """
+    if len(samples.texel) == 0:
+        return None
+    pixels = texture.pixels
+    whole = {"[0, 1]": 1.0, "[-1, 1]": 2.0}.get(texture.metadata.get("range", ""))
+    if whole is None:
+        near = pixels.reshape(-1, pixels.shape[2])[samples.texel]
+        whole = max(float(np.ptp(near, axis=(0, 1)).max()), float(np.finfo(np.float32).tiny))
+    error = np.abs(samples.differences(pixels)).max(axis=1) / whole
+    return SeamError(float(error.max()), float(np.quantile(error, 0.99)), len(error))
+
+
+def seam_changes(
+    pixels: NDArray[np.float32], samples: SeamSamples, fixed: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """What to add so that the sides of seams agree: flat texels (g,) of an image (h, w, c), and changes (g, c).
+
+    fixed: (h, w) bool, the texels whose centres lie in a chart; they stay.
+    Minimises Σ (difference of the sides)² + `HOLD` Σ (change)² over the free texels of the samples' footprints.
+    """
+    free = np.unique(samples.texel[~fixed.reshape(-1)[samples.texel]])
+    if len(free) == 0:
+        return free, np.zeros((0, pixels.shape[2]), np.float32)
+    matrix = _free_part(samples, free, fixed)
+    system = (matrix.T @ matrix + HOLD * sparse.identity(len(free))).tocsr()
+    right = -(matrix.T @ samples.differences(pixels))
+    return free, _conjugate_gradients(system, right).astype(np.float32)
+
+
+def seam_report(atlas: Atlas, textures: Mapping[str, Texture]) -> dict[str, dict[str, float]]:
+    """Map → "max" and "p99" of `seam_error`, for the maps that are one function on both sides of a seam.
+
+    A value of at most 1/255 is less than one step of 8 bits.
+    """
+    seams, report = find_seams(atlas), {}
+    for name, texture in textures.items():
+        error = None
+        if agrees_across_seams(name, texture.metadata.get("space", "")):
+            error = seam_error(texture, sample_seams(seams, texture.pixels.shape[0]))
+        if error is not None:
+            report[name] = {"max": error.maximum, "p99": error.p99}
+    return report
+
+
+def bleed_free_mip(labels: NDArray[np.int32], atlas: Atlas) -> int:
+    """The highest mip level at which bilinear samples on the borders of charts see their own chart alone.
+
+    labels: (size, size) int32, the chart of each texel, gutters included, −1 beyond them.  Levels are halved by boxes,
+    as long as the size is even.  −1 where not even the full image is free of bleeding.
+    """
+    face, corner = border_edges(atlas.faces, atlas.uv).T.astype(np.int64)
+    ends = atlas.uv[np.stack([atlas.faces[face, corner], atlas.faces[face, (corner + 1) % 3]], axis=1)]
+    edge, place = _along(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * labels.shape[0])
+    uv = ends[edge, 0] + place[:, None] * (ends[edge, 1].astype(np.float64) - ends[edge, 0])
+    chart, low, high, level = atlas.face_chart[face[edge]], labels, labels, -1
+    while True:
+        texel, weight = footprint(uv, len(low))
+        own = (low.reshape(-1)[texel] == chart[:, None]) & (high.reshape(-1)[texel] == chart[:, None])
+        if not (own | (weight < 1e-6)).all():
+            return level
+        level += 1
+        if len(low) % 2:
+            return level
+        blocks = (len(low) // 2, 2, len(low) // 2, 2)
+        low, high = low.reshape(blocks).min(axis=(1, 3)), high.reshape(blocks).max(axis=(1, 3))
+
+
+def _along(length: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(s,) edge and place in (0, 1) of samples along edges of lengths (e,) in texels, evenly, at least two an edge."""
+    count = np.maximum(np.ceil(PER_TEXEL * length), 2).astype(np.int64)
+    edge = np.repeat(np.arange(len(length)), count)
+    return edge, (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
+
+
+def _free_part(samples: SeamSamples, free: NDArray[np.int64], fixed: NDArray[np.bool_]) -> sparse.csr_matrix:
+    """(s, g) matrix: the differences' dependence on the free texels."""
+    loose = ~fixed.reshape(-1)[samples.texel]
+    row = np.repeat(np.arange(len(loose)), 8).reshape(loose.shape)[loose]
+    column = np.searchsorted(free, samples.texel[loose])
+    return sparse.csr_matrix((samples.weight[loose], (row, column)), shape=(len(loose), len(free)))
+
+
+def _conjugate_gradients(
+    system: sparse.csr_matrix, right: NDArray[np.float64], *, steps: int = 200, accuracy: float = 1e-3
+) -> NDArray[np.float64]:
+    """Solve system · x = right for all columns of right (g, c) at once, each to a relative accuracy."""
+    scale = 1.0 / np.asarray(system.diagonal())[:, None]
+    change, residual = np.zeros_like(right), right.copy()
+    ahead = direction = scale * residual
+    product = (residual * ahead).sum(axis=0)
+    enough = accuracy**2 * np.maximum(product, np.finfo(np.float64).tiny)
+    for _ in range(steps):
+        if (product <= enough).all():
+            break
+        image = system @ direction
+        step = product / np.maximum((direction * image).sum(axis=0), np.finfo(np.float64).tiny)
+        change += step * direction
+        residual -= step * image
+        ahead = scale * residual
+        previous, product = product, (residual * ahead).sum(axis=0)
+        direction = ahead + product / np.maximum(previous, np.finfo(np.float64).tiny) * direction
+    return change
