@@ -1,8 +1,9 @@
 """Preset ``paper``, from a surface to finished charts: the paper's training, its raw figures, then valid charts.
 
 n points · f faces · v vertices · p charts.
-surface (source units) → unit ball → train_paper → raw figures → finishing → patches → fit.  The raw figures are those of the networks' own map, as the paper measures it; the finished ones are
-those of the charts that come back, in source units.
+surface (source units) → unit ball → train_paper → raw figures → finishing → patches → fit.
+The raw figures are those of the networks' own map, as the paper measures it; the finished ones are those of the charts
+that come back, in source units.
 """
 
 from __future__ import annotations
