@@ -44,9 +44,8 @@ CHARTS = {
 
 def to_bytes(trained: Trained, source_sha256: str) -> bytes:
     """The file's content.  source_sha256: of the mesh that was trained on."""
-    tensors = {
-        f"charts.{name}": torch.from_numpy(np.ascontiguousarray(getattr(trained.charts, name))) for name in CHARTS
-    }
+    arrays = {name: np.array(getattr(trained.charts, name), order="C") for name in CHARTS}  # they may share memory
+    tensors = {f"charts.{name}": torch.from_numpy(array) for name, array in arrays.items()}
     weights = trained.networks.state_dict()
     tensors |= {f"networks.{name}": weight.contiguous() for name, weight in weights.items()}
     facts = {
