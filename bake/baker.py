@@ -5,6 +5,7 @@ h w texels, row 0 = top · t texels of one call.  `bake` makes Textures in memor
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -53,6 +54,7 @@ def bake(
     device: Device = "auto",
     limit: int | None = None,
     tile: tuple[int, int] | None = None,
+    scratch: Path | None = None,
     progress: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> dict[str, Texture]:
@@ -70,6 +72,7 @@ def bake(
         device: "auto", "opengl" or "software", see `tiles.open_rasterizer`.
         limit: the largest side drawn at once, in samples; what the device allows unless given.
         tile: the UDIM tile (a, b) to draw, see `udim.py`.
+        scratch: a folder on whose disk the images are kept, in files without a name, instead of in memory: for 16k.
         progress: called with each map's name before it is made.
         warn: called with one line when OpenGL cannot be had and numpy draws instead.
 
@@ -101,7 +104,7 @@ def bake(
                 inside[baked.window.rows, baked.window.columns] = baked.inside
                 for entry in drawn:
                     part = baked.maps[entry.name]
-                    image = pixels[entry.name] = with_channels(pixels.get(entry.name), part.shape[2], texels)
+                    image = pixels[entry.name] = with_channels(pixels.get(entry.name), part.shape[2], texels, scratch)
                     target = image[baked.window.rows, baked.window.columns]
                     background = np.asarray((*entry.background, 1.0)[: part.shape[2]], np.float32)
                     baked.gutter.fill(part, background, target[..., : part.shape[2]])
@@ -171,16 +174,28 @@ def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
         return rasterize(context, atlas, size)
 
 
-def with_channels(image: NDArray[np.float32] | None, channels: int, size: int) -> NDArray[np.float32]:
+def with_channels(
+    image: NDArray[np.float32] | None, channels: int, size: int, scratch: Path | None = None
+) -> NDArray[np.float32]:
     """An image (size, size, c) of at least so many channels: new, as it is, or with alpha 1 added.
 
     The number of channels may differ from window to window: a map leaves out alpha where it is 1.
     """
-    if image is None:
-        return np.zeros((size, size, channels), np.float32)
-    if image.shape[2] >= channels:
+    if image is not None and image.shape[2] >= channels:
         return image
-    return np.concatenate([image, np.ones((size, size, channels - image.shape[2]), np.float32)], axis=2)
+    wider = new_image((size, size, channels), scratch)
+    if image is not None:
+        wider[..., : image.shape[2]] = image
+        wider[..., image.shape[2] :] = 1.0
+    return wider
+
+
+def new_image(shape: tuple[int, int, int], scratch: Path | None) -> NDArray[np.float32]:
+    """Zeros (h, w, c) float32 in memory, or in a file without a name in a folder, which goes when the array goes."""
+    if scratch is None:
+        return np.zeros(shape, np.float32)
+    with tempfile.TemporaryFile(dir=scratch) as file:
+        return np.memmap(file, np.float32, "w+", shape=shape)
 
 
 def close_seams(

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 REACH = 0.71
 """Texels; a little over √½."""
-EDGE = 1e-6
-"""Least barycentric weight of a point inside a face."""
+LEAST = 2.0**-20
+"""Least barycentric weight of a point inside a face, as in shaders/interior.frag.glsl; on a border one weight is 0."""
 CHUNK = 1 << 18
 """Texels interpolated at once: bounds the memory of temporaries."""
 GROWTH = 1.0 / 16.0
@@ -96,7 +96,7 @@ class GBuffer:
     def inside(self) -> NDArray[np.bool_]:
         """(h, w) bool: texels whose centres lie in a face, not merely near the border of a chart."""
         least = np.minimum(np.minimum(self.second, self.third), 1.0 - self.second - self.third)
-        return (self.face >= 0) & (least > EDGE)
+        return (self.face >= 0) & (least > 0.5 * LEAST)
 
     def image_texels(self, texels: NDArray[np.int64]) -> NDArray[np.int64]:
         """(t,) int64 flat indices in the whole image of flat indices in this window: seeds that no window changes."""

@@ -199,7 +199,7 @@ def _free_part(samples: SeamSamples, free: NDArray[np.int64], fixed: NDArray[np.
 
 
 def _conjugate_gradients(
-    system: sparse.csr_matrix, right: NDArray[np.float64], *, steps: int = 200, accuracy: float = 1e-3
+    system: sparse.csr_matrix, right: NDArray[np.float64], *, steps: int = 200, accuracy: float = 1e-5
 ) -> NDArray[np.float64]:
     """Solve system · x = right for all columns of right (g, c) at once, each to a relative accuracy."""
     scale = 1.0 / np.asarray(system.diagonal())[:, None]

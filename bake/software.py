@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.errors import InputError
-from .gbuffer import REACH, WINDOW, GBuffer
+from .gbuffer import LEAST, REACH, WINDOW, GBuffer
 from .layout import Layout, Planes, Window, windows
 
 if TYPE_CHECKING:
@@ -125,13 +125,14 @@ class SoftwareRasterizer:
     def _inside_weights(
         self, faces: NDArray[np.integer], texels: NDArray[np.int64], window: Window
     ) -> NDArray[np.float64]:
-        """(t, 3) barycentric weights of the centres, clamped into the face."""
+        """(t, 3) barycentric weights of the centres, clamped into the face, each at least `LEAST`."""
         centre = _centres(texels, window) / ONE
         a, b, c = (self.layout.texel[faces, i].astype(np.float64) - centre for i in range(3))
         raw = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
         weight = np.maximum(raw * np.sign(_cross(b - a, c - a))[:, None], 0.0)
         total = weight.sum(axis=1, keepdims=True)
-        return np.where(total > 0.0, weight / np.where(total > 0.0, total, 1.0), 1.0 / 3.0)
+        weight = np.maximum(np.where(total > 0.0, weight / np.where(total > 0.0, total, 1.0), 1.0 / 3.0), LEAST)
+        return weight / weight.sum(axis=1, keepdims=True)
 
     def _edge_weights(
         self, faces: NDArray[np.int64], corner: NDArray[np.int64], texels: NDArray[np.int64], window: Window

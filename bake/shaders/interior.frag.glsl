@@ -2,6 +2,8 @@
 // to the centre, not from interpolation, which would lose digits far from the image's corner; what snapping leaves outside
 // the face is clamped into it.
 
+const float LEAST = 1.0 / 1048576.0;  // by this the inside of a face differs from its edges, where one weight is 0
+
 float cross2(vec2 a, vec2 b) {
     return a.x * b.y - a.y * b.x;
 }
@@ -21,6 +23,7 @@ void main() {
     float area = cross2(texel1 - texel0, texel2 - texel0);
     vec3 weight = max(vec3(cross2(b, c), cross2(c, a), cross2(a, b)) * sign(area), 0.0);
     float total = weight.x + weight.y + weight.z;
-    weight = total > 0.0 ? weight / total : vec3(1.0 / 3.0);
+    weight = total > 0.0 ? max(weight / total, LEAST) : vec3(1.0 / 3.0);
+    weight /= weight.x + weight.y + weight.z;
     write_surface(weight, weight.yz);
 }

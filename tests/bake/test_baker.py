@@ -126,6 +126,17 @@ def test_a_function_may_return_one_number_a_texel_and_nothing_else(two_charts: P
         bake(two_charts[0], {}, {})
 
 
+def test_images_kept_on_disk_are_the_same_and_leave_no_file(sphere: Pair, tmp_path: Path) -> None:
+    names = ["position", "normal-object", "chart"]
+    memory, disk = (bake(*sphere, names, size=100, padding=3, scratch=folder) for folder in (None, tmp_path))
+    assert list(tmp_path.iterdir()) == []
+    for name in names:
+        assert isinstance(disk[name].pixels, np.memmap)
+        np.testing.assert_array_equal(disk[name].pixels, memory[name].pixels)
+    paths = [write_textures(textures, tmp_path, stem) for textures, stem in ((memory, "a"), (disk, "b"))]
+    assert [path.read_bytes() for path in paths[0]] == [path.read_bytes() for path in paths[1]]
+
+
 @pytest.mark.parametrize("limit", [24, 31, 60])
 @pytest.mark.parametrize("samples", [1, 4])
 def test_tiles_change_no_bit_of_any_map(sphere: Pair, limit: int, samples: int) -> None:
@@ -142,7 +153,10 @@ def test_the_software_rasterizer_bakes_the_same(sphere: Pair) -> None:
     first, second = (bake(*sphere, names, size=64, padding=3, device=device) for device in ("opengl", "software"))
     np.testing.assert_array_equal(first["face-id"].pixels, second["face-id"].pixels)
     np.testing.assert_array_equal(first["chart"].pixels, second["chart"].pixels)
-    assert np.abs(first["position"].pixels - second["position"].pixels).max() < 1e-5
+    inside = make_gbuffer(sphere[0], 64).inside
+    difference = np.abs(first["position"].pixels - second["position"].pixels).max(axis=-1)
+    assert difference[inside].max() < 1e-5
+    assert difference.max() < 1e-4  # beside charts seams are closed by iteration
 
 
 def test_without_opengl_numpy_draws_and_says_so(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:

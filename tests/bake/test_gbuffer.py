@@ -76,6 +76,14 @@ def test_a_window_drawn_again_into_kept_planes_is_the_same(sphere: Pair, context
             drawn.draw(windows(50, 21, 1000)[0])
 
 
+def test_inside_are_the_texels_whose_centres_a_chart_holds(two_charts: Pair, context: moderngl.Context) -> None:
+    buffer = rasterize(context, two_charts[0], 64)  # squares of 16 texels whose borders lie between texels
+    assert buffer.inside.sum() == 2 * 16 * 16
+    assert (buffer.face >= 0).sum() == 2 * 18 * 18
+    centred = replace(two_charts[0], uv=two_charts[0].uv + np.float32(0.5 / 64))
+    assert rasterize(context, centred, 64).inside.sum() == 2 * 17 * 17
+
+
 def test_row_0_is_the_top(quad: Pair, context: moderngl.Context) -> None:
     buffer = rasterize(context, quad[0], 8)
     assert buffer.position[0, 0, 1] > 0.9

@@ -22,6 +22,7 @@ Pair = tuple[Atlas, Asset]
 
 def assert_equal(first: GBuffer, second: GBuffer) -> None:
     np.testing.assert_array_equal(first.face, second.face)
+    np.testing.assert_array_equal(first.inside, second.inside)
     for name in ("position", "normal", "second", "third"):
         assert np.abs(getattr(first, name) - getattr(second, name)).max() < 1e-5, name
 
