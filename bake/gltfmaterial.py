@@ -5,7 +5,7 @@
 | the first of `BASE_COLOR_MAPS` | base colour |
 | normal | normal texture, green up whatever it was baked for |
 | orm, else metallic-roughness | metallic-roughness |
-| orm of a source with occlusion, else occlusion, ao, orm | occlusion |
+| ao, else occlusion, else orm | occlusion |
 | emissive | emissive, with KHR_materials_emissive_strength above 1 |
 """
 
@@ -18,14 +18,16 @@ import numpy as np
 from ..runtime.materials import PbrMaterial, picture_of, used_materials
 from ..runtime.topology import edge_table
 from .glbbuffer import Buffer, gl
-from .images import Texture, encode_png
+from .images import encode_png
 from .material import DEFAULT_FINISH, emissive_strength, finish_of
+from .targets import with_green
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ..runtime.materials import AlphaMode
     from ..runtime.mesh import Asset, Material
+    from .images import Texture
 
 BASE_COLOR_MAPS = ("base-color", "vertex-color", "uv-checker", "chart")
 """The first of these that was baked becomes the base colour."""
@@ -46,7 +48,7 @@ class Images:
     def embed(self, name: str) -> int:
         """The number of the map's glTF texture."""
         if name not in self.known:
-            texture = _green_up(self.textures[name]) if name == "normal" else self.textures[name]
+            texture = with_green(self.textures[name], "opengl") if name == "normal" else self.textures[name]
             self.known[name] = self._add(name, encode_png(texture, bits=8))
         return self.known[name]
 
@@ -79,7 +81,7 @@ def add_material(document: gl.GLTF2, buffer: Buffer, asset: Asset, textures: Map
     _add_alpha(material, images, used)
     if "normal" in textures:
         material.normalTexture = gl.NormalMaterialTexture(index=images.embed("normal"))
-    shadow = _occlusion_name(images, asset)
+    shadow = images.first("ao", "occlusion", "orm")
     if shadow is not None:
         material.occlusionTexture = gl.OcclusionTextureInfo(index=images.embed(shadow))
     _add_emission(document, material, images, asset, used)
@@ -119,12 +121,6 @@ def _add_alpha(material: gl.Material, images: Images, used: list[Material]) -> N
         material.alphaCutoff = 0.5 if name is not None else cutoffs[0]  # the map is scaled so that the cut lies at ½
 
 
-def _occlusion_name(images: Images, asset: Asset) -> str | None:
-    """The map that says how open the surface is."""
-    shaded = asset.uv is not None and any(picture_of(entry, "occlusion") is not None for entry in asset.materials)
-    return images.first("orm", "occlusion", "ao") if shaded else images.first("occlusion", "ao", "orm")
-
-
 def _add_emission(
     document: gl.GLTF2, material: gl.Material, images: Images, asset: Asset, used: list[Material]
 ) -> None:
@@ -143,11 +139,3 @@ def _add_emission(
         extensions: dict[str, Any] = {STRENGTH: {"emissiveStrength": strength}}
         material.extensions = extensions
         document.extensionsUsed = [*(document.extensionsUsed or []), STRENGTH]
-
-
-def _green_up(texture: Texture) -> Texture:
-    """A tangent-space normal map as glTF wants it, whatever it was baked for."""
-    if not texture.metadata.get("space", "").endswith("Y down"):
-        return texture
-    pixels = texture.pixels * np.array([1.0, -1.0, 1.0], np.float32)
-    return Texture(pixels, texture.encoding, texture.bits, texture.file_type, texture.dither, texture.metadata)
