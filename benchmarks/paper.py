@@ -25,7 +25,7 @@ from flexpara.runtime.errors import FlexparaError
 from flexpara.runtime.meshfile import load_asset
 from flexpara.runtime.metrics import measure
 
-from .paper_markdown import comparisons, markdown, name_of
+from .paper_markdown import READINGS, comparisons, markdown, name_of
 from .systems import ABLATIONS, MODES, MODES_OF, NAMES, Job, Outcome, run
 from .tables import coverage, load_figures
 from .unwrap import ROOT, SUFFIXES, header
@@ -58,9 +58,14 @@ def row_of(job: Job, asset: Asset, outcome: Outcome) -> Row:
         metrics = measure(asset.surface, corner_uv).to_dict()
     except FlexparaError as error:
         return row | {"status": "failed", "why": f"its uv can't be measured: {error}"}
-    paper = report.get("train", {}).get("paper") or {}
-    raw = paper.get("raw", paper) or None
-    return row | {"metrics": metrics, "seconds": seconds, "raw": raw, "report": report}
+    return row | {"metrics": metrics, "seconds": seconds, "raw": raw_figures(report), "report": report}
+
+
+def raw_figures(report: Row) -> dict[str, Row]:
+    """Figures of the network's own map in a report of flexpara, by reading; empty where it has none."""
+    train = report.get("train", {})
+    raw = train.get("paper", train).get("raw", {})
+    return {name: raw[name] for name in READINGS if name in raw}
 
 
 def jobs_of(mode: str, arguments: argparse.Namespace) -> list[Job]:

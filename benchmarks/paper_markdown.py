@@ -45,8 +45,9 @@ QUANTITIES = {
         "conformal_mean", "conformality", "{:.4f}", 1.0, True,
         "`conformal_mean`: mean over faces of the mean |angle − uv angle| of the three corners, radians. Paper: “the "
         "average absolute angular difference between corresponding triangles”, unit not stated, radians assumed. Ours "
-        "counts every face of the finished atlas; rows marked raw are the paper's own reading, the network's map on "
-        "faces that don't cross the learned seam.",
+        "counts every face of the finished atlas; rows marked raw are the network's own map before it is finished, which "
+        "is what the paper measures: in global mode over all faces, and over those that don't cross the learned seam; in "
+        "multi-chart mode over the faces whose corners are in one chart.",
     ),
     "isometric": Quantity(
         "isometric_mean", "isometric ×10⁻⁴ †", "{:.1f}", 1e-4, False,
@@ -78,9 +79,8 @@ PAPER_NAMES = {
     "without-upper-branch": "FlexPara, no upper branch", "without-lower-branch": "FlexPara, no lower branch",
     "with-bi-directional": "FlexPara, bi-directional", "with-ddl": "FlexPara, with DDL",
 }  # fmt: skip
-RAW_NAMES = {
-    name: (name, quantity.metric, quantity.metric.removesuffix("_mean")) for name, quantity in QUANTITIES.items()
-}
+READINGS = {"all": "the network's own map", "off_seam": "the same, faces across the seam left out"}
+"""Readings of a map that is not finished, as flexpara reports them: the paper doesn't say which of them it takes."""
 
 
 def markdown(facts: Row, rows: list[Row]) -> str:
@@ -134,7 +134,7 @@ def name_of(row: Row) -> str:
 
 
 def measured_cells(row: Row) -> list[list[str]]:
-    """The line of a run, and where the run gives the paper's raw figures a second one."""
+    """The line of a run, and one for each raw reading it gives."""
     name = name_of(row).replace("flexpara", "**flexpara**")
     if row["status"] != "done":
         return [[row["mesh"], name, *[""] * (len(COLUMNS) + 3), f"{row['status']}: {row['why']}"]]
@@ -142,21 +142,15 @@ def measured_cells(row: Row) -> list[list[str]]:
     ratio = row.get("isometric_ratio")
     values.insert(2, "" if ratio is None else f"{ratio:.2f}")
     metrics = row["metrics"]
-    note = "on flexpara's seams" if row["system"] == "slim" else "finished atlas" if row.get("raw") else ""
+    note = "on flexpara's seams" if row["system"] == "slim" else "finished atlas" if row["raw"] else ""
     note = f"Blender {row['report']['blender']}" if row["system"] == "smart-uv" else note
     flips = [str(metrics["flipped_faces"]), f"{metrics['overlap_fraction']:.1e}"]
     lines = [[row["mesh"], name, *values, *flips, note]]
-    if row.get("raw"):
-        raw = [QUANTITIES[column].text(raw_value(row["raw"], column)) for column in COLUMNS]
+    for reading, figures in row["raw"].items():
+        raw = [QUANTITIES[column].text(figures.get(QUANTITIES[column].metric)) for column in COLUMNS]
         raw.insert(2, "")
-        lines.append([row["mesh"], f"{name}, raw", *raw, "", "", "the network's own map, seam faces left out"])
+        lines.append([row["mesh"], f"{name}, raw", *raw, "", "", READINGS[reading]])
     return lines
-
-
-def raw_value(raw: Row, quantity: str) -> float | None:
-    """A quantity among the raw figures, under its own name or its metric's; None where it isn't."""
-    found = (raw[name] for name in RAW_NAMES[quantity] if isinstance(raw.get(name), int | float))
-    return next(found, None)
 
 
 def paper_groups(figures: list[Figure]) -> list[list[Figure]]:
@@ -181,7 +175,7 @@ def paper_cells(mesh: str, group: list[Figure], figures: list[Figure]) -> list[s
 def comparisons(rows: list[Row]) -> list[Row]:
     """Each figure of the paper whose model, mode, system and ablation were measured here, with what was measured.
 
-    paper, measured: in the unit of the figure.  raw: the network's own map, where the run says so, else None.
+    paper, measured: in the unit of the figure.  raw: reading → the network's own map, where the run says so.
     comparable: whether the paper's definition fits ours; ratios of the others mean nothing.
     """
     found, figures = list[Row](), load_figures()
@@ -191,7 +185,8 @@ def comparisons(rows: list[Row]) -> list[Row]:
             same = {"table": item.table, "label": item.label, "model": item.model, "mode": item.mode}
             same |= {"paper_system": item.system, "system": row["system"], "ablation": row["ablation"]}
             same |= {"quantity": item.quantity, "paper": item.value, "measured": quantity.of(row)}
-            raw = raw_value(row["raw"], item.quantity) if row["raw"] else None
+            raw = {name: figures.get(quantity.metric) for name, figures in row["raw"].items()}
+            raw = {name: value for name, value in raw.items() if value is not None}
             found.append(same | {"raw": raw, "comparable": quantity.comparable})
     return found
 
@@ -205,7 +200,8 @@ def beside(rows: list[Row]) -> str:
         names = [item["table"], item["model"], item["mode"], f"{item['system']} {item['ablation']}".strip()]
         numbers = [quantity.text(item["paper"]), quantity.text(item["measured"])]
         ratio = f"{item['measured'] / item['paper']:.2f}"
-        lines.append(joined([*names, quantity.heading, *numbers, ratio, quantity.text(item["raw"])]))
+        raw = ", ".join(f"{quantity.text(value)} {reading}".replace("_", " ") for reading, value in item["raw"].items())
+        lines.append(joined([*names, quantity.heading, *numbers, ratio, raw]))
     whole = "\n".join(lines) if len(lines) > 2 else "None: no run that is done has a figure in the paper's tables."
     return f"## Figure by figure, where definitions agree\n\n{whole}"
 
