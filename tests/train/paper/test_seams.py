@@ -209,3 +209,16 @@ def test_a_trefoil_tube_opens_along_a_band_and_no_farther() -> None:
     seam = seam_of(trefoil, np.stack([2.0 * banded(t, 0.1), 0.14 * banded(v, 0.3)], axis=1))
     lines = (np.abs(t[seam]) > np.pi - 0.15).all(axis=1) | (np.abs(v[seam]) > np.pi - 1.1).all(axis=1)
     assert lines.all()
+
+
+def test_more_faces_than_fit_into_32_bits_of_pairs() -> None:
+    """Pairs of faces are numbered i · f + j: from 46,341 faces on, 32 bits don't hold them."""
+    sphere = sample("sphere", 256)
+    assert len(sphere.faces) > 46_341
+    assert 2.5 < length_of(sphere, seam_of(sphere, np.zeros((len(sphere.vertices), 2)))) < 1.2 * np.pi
+
+
+def test_the_smallest_closed_surface_becomes_a_disk() -> None:
+    corners = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    tetrahedron = Surface(corners, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]))
+    seam_of(tetrahedron, corners[:, :2])
