@@ -31,7 +31,7 @@ def read_materials(file: GltfFile) -> tuple[list[PbrMaterial], dict[str, int]]:
     Counted are textures whose picture can't be had, and textures on another uv set than the material's first one.
     Raises: MeshError for a picture that is none; lookup and value errors where the tree is damaged.
     """
-    changes: dict[str, int] = {name: 0 for name in COUNTS}
+    changes: dict[str, int] = dict.fromkeys(COUNTS, 0)
     pictures: dict[int, NDArray[np.uint8]] = {}
     entries = enumerate(file.tree.get("materials", []))
     return [_material(file, entry, index, pictures, changes) for index, entry in entries], changes
