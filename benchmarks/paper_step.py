@@ -165,14 +165,14 @@ def our_step(samples: PaperInput, config: PaperConfig) -> Callable[[], None]:
     """One step as train_paper takes it."""
     device = choose_device(config)
     source, run = BatchSource(samples, config, device), Run.begin(config, device)
-    lattice, networks = source.lattice, run.networks
+    networks = run.networks
 
     def step() -> None:
         batch = source.draw(run.generator)
         if isinstance(networks, GlobalNetworks):
-            loss = global_loss(networks, batch, lattice, config)
+            loss = global_loss(networks, batch, config)
         else:
-            loss = chart_loss(networks, batch, lattice, config)
+            loss = chart_loss(networks, batch, config)
         run.optimizer.step(loss)
 
     return step

@@ -73,8 +73,9 @@ class Batch:
     """The part of the input that one step uses.
 
     xyz (b, 3) float32.  normal (b, 3) or None.  triangles (t, 3) int64 into b, or None, with their angles (t, 3) in
-    radians.  edges (e, 2) int64 into b with lengths (e,).  near: the points, ready to be asked for neighbours.
-    total: n, points of the whole input.  edge_total: its edges, each counted once a triangle.
+    radians.  edges (e, 2) int64 into b with lengths (e,).  lattice (m, 2) float32 in [−1, 1]².
+    all_xyz (n, 3): the whole input, near: the same, ready to be asked for neighbours.  edge_total: edges of the whole
+    input, each counted once a triangle.
     """
 
     xyz: Tensor
@@ -83,8 +84,9 @@ class Batch:
     angles: Tensor | None
     edges: Tensor
     lengths: Tensor
+    lattice: Tensor
+    all_xyz: Tensor
     near: Neighbourhood
-    total: int
     edge_total: int
 
 
@@ -101,13 +103,9 @@ class BatchSource:
         else:
             self._groups = torch.from_numpy(np.ascontiguousarray(samples.faces, dtype=np.int64))
             self._angles = corner_angles(points[self._groups]).float()
-        self._whole = self._assemble(torch.arange(len(points)), None) if self._count == len(points) else None
-
-    @property
-    def lattice(self) -> Tensor:
-        """G: ⌊√b⌋² nodes over [−1, 1]², (m, 2) float32."""
-        line = torch.linspace(-1.0, 1.0, math.isqrt(self._count), device=self._device)
-        return torch.cartesian_prod(line, line)
+        self._near = Neighbourhood(self._xyz)
+        whole = self._count == len(points)
+        self._whole = self._assemble(torch.arange(len(points)), None, torch.zeros(2)) if whole else None
 
     def draw(self, generator: torch.Generator) -> Batch:
         """The next batch; where it is the whole input, nothing is drawn."""
@@ -120,10 +118,18 @@ class BatchSource:
         others[corners] = False
         free = torch.nonzero(others)[:, 0]
         fill = free[torch.randperm(len(free), generator=generator)[: self._count - len(corners)]]
-        return self._assemble(torch.cat([corners, fill]), pick)
+        return self._assemble(torch.cat([corners, fill]), pick, torch.rand(2, generator=generator) - 0.5)
 
-    def _assemble(self, index: Tensor, pick: Tensor | None) -> Batch:
-        """Batch of the points ``index`` (b,) with the groups ``pick``, or all."""
+    def _lattice(self, shift: Tensor) -> Tensor:
+        """G, (m, 2)."""
+        side = math.isqrt(self._count)
+        line = (torch.arange(side) + 0.5 + shift[:, None]) / side * 2.0 - 1.0
+        if self._count == len(self._xyz):
+            line = torch.linspace(-1.0, 1.0, side).expand(2, -1)
+        return torch.cartesian_prod(*line).to(self._device)
+
+    def _assemble(self, index: Tensor, pick: Tensor | None, shift: Tensor) -> Batch:
+        """Batch of the points ``index`` (b,) with the groups ``pick``, or all, and a lattice moved by ``shift``."""
         place = torch.zeros(len(self._xyz), dtype=torch.int64)
         place[index] = torch.arange(len(index))
         groups = place[self._groups if pick is None else self._groups[pick]].to(self._device)
@@ -136,7 +142,8 @@ class BatchSource:
             total = 3 * total
         lengths = (xyz[edges[:, 0]] - xyz[edges[:, 1]]).norm(dim=1)
         normal = None if self._normal is None else self._normal[index.to(self._device)]
-        return Batch(xyz, normal, triangles, angles, edges, lengths, Neighbourhood(xyz), len(self._xyz), total)
+        lattice = self._lattice(shift)
+        return Batch(xyz, normal, triangles, angles, edges, lengths, lattice, self._xyz, self._near, total)
 
 
 def cloud_edges(points: Tensor, count: int) -> Tensor:

@@ -64,13 +64,13 @@ def run_branches(networks: GlobalNetworks, xyz: Tensor, lattice: Tensor, config:
     )
 
 
-def global_terms(networks: GlobalNetworks, batch: Batch, lattice: Tensor, config: PaperConfig) -> dict[str, Tensor]:
+def global_terms(networks: GlobalNetworks, batch: Batch, config: PaperConfig) -> dict[str, Tensor]:
     """The terms that the input and the ablation leave, by name, each reduced to a scalar, not yet weighted."""
-    made = run_branches(networks, batch.xyz, lattice, config)
+    made = run_branches(networks, batch.xyz, batch.lattice, config)
     terms: dict[str, Tensor] = {"cycle": batch.xyz.new_zeros(())}
     if made.uv is not None and made.cycle is not None:
         near = own_neighbours(made.uv, config.neighbours)
-        epsilon = config.epsilon * box_side(made.uv) / batch.total**0.5
+        epsilon = config.epsilon * box_side(made.uv) / len(batch.all_xyz) ** 0.5
         terms["unwrap"] = _mean(repulsion(made.uv, near, epsilon).sum(dim=-1))
         terms["cycle"] = terms["cycle"] + _mean(position_gap(made.cycle[:, :3], batch.xyz))
         if batch.normal is not None:
@@ -87,15 +87,19 @@ def global_terms(networks: GlobalNetworks, batch: Batch, lattice: Tensor, config
     return terms
 
 
-def global_loss(networks: GlobalNetworks, batch: Batch, lattice: Tensor, config: PaperConfig) -> Tensor:
+def global_loss(networks: GlobalNetworks, batch: Batch, config: PaperConfig) -> Tensor:
     """ℓ_global of one step, a scalar."""
-    terms = global_terms(networks, batch, lattice, config)
+    terms = global_terms(networks, batch, config)
     return torch.stack([getattr(config.global_weights, name) * value for name, value in terms.items()]).sum()
 
 
 def chamfer(xyz: Tensor, batch: Batch) -> Tensor:
-    """CD(P̂; P): mean squared distance to the nearest point, there and back, summed."""
-    there = nearest_gap(xyz, batch.xyz, batch.near.nearest(xyz, 1)[:, 0])
+    """CD(P̂; P): mean squared distance to the nearest point, there and back, summed.
+
+    There: from P̂ to all points of the input; back: from the points of the batch.  Decided: squared, the usual form;
+    the paper doesn't say.
+    """
+    there = nearest_gap(xyz, batch.all_xyz, batch.near.nearest(xyz, 1)[:, 0])
     back = nearest_gap(batch.xyz, xyz, Neighbourhood(xyz).nearest(batch.xyz, 1)[:, 0])
     return _mean(there) + _mean(back)
 

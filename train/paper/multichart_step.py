@@ -37,9 +37,7 @@ def chart_epsilon(uv: Tensor, score: Tensor, total: int, config: PaperConfig) ->
     return config.epsilon * side / (count.clamp(min=1) * (total / score.shape[1])).sqrt()
 
 
-def chart_terms(
-    networks: MultiChartPaperNetworks, batch: Batch, lattice: Tensor, config: PaperConfig
-) -> dict[str, Tensor]:
+def chart_terms(networks: MultiChartPaperNetworks, batch: Batch, config: PaperConfig) -> dict[str, Tensor]:
     """The terms that the input and the ablation leave, by name, each reduced to a scalar, not yet weighted."""
     dtype = getattr(torch, config.dtype) if batch.xyz.dtype == torch.float32 else batch.xyz.dtype
     logits, uv = networks.flatten(batch.xyz, dtype)
@@ -50,7 +48,7 @@ def chart_terms(
     else:
         cycle, slopes = networks.fold(uv, dtype), None
     near = torch.stack([own_neighbours(flat, config.neighbours) for flat in uv.unbind()])
-    repelled = repulsion(uv, near, chart_epsilon(uv, score, batch.total, config), score)
+    repelled = repulsion(uv, near, chart_epsilon(uv, score, len(batch.all_xyz), config), score)
     total = position_gap(cycle[..., :3], batch.xyz)
     if batch.normal is not None:
         total = total + cosine_gap(cycle[..., 3:], batch.normal)
@@ -62,23 +60,21 @@ def chart_terms(
     }
     if slopes is not None:
         terms["differential"] = weighted_mean(eigenvalue_gap(slopes), score)
-    return terms | (upper_terms(networks, batch, lattice, dtype) if config.ablation.chart_bidirectional else {})
+    return terms | (upper_terms(networks, batch, dtype) if config.ablation.chart_bidirectional else {})
 
 
-def upper_terms(
-    networks: MultiChartPaperNetworks, batch: Batch, lattice: Tensor, dtype: torch.dtype
-) -> dict[str, Tensor]:
+def upper_terms(networks: MultiChartPaperNetworks, batch: Batch, dtype: torch.dtype) -> dict[str, Tensor]:
     """The 2D → 3D → 2D branch of the ablation: a Chamfer distance to all charts' points together, and the uv cycle.
 
     Decided: a node counts on its chart by the score its own wrapped point gets there, so unused charts stay out.
     """
-    hat_uv = networks.deform(lattice, dtype)
+    hat_uv = networks.deform(batch.lattice, dtype)
     hat_xyz = networks.fold(hat_uv, dtype)[..., :3]
     logits, hat_cycle = networks.flatten(hat_xyz, dtype)
     chart = torch.arange(len(hat_uv), device=logits.device).view(-1, 1, 1).expand(*logits.shape[:2], 1)
     score = torch.softmax(logits, dim=-1).gather(-1, chart)[..., 0]
     flat = hat_xyz.reshape(-1, 3)
-    there = nearest_gap(flat, batch.xyz, batch.near.nearest(flat, 1)[:, 0]).view(score.shape)
+    there = nearest_gap(flat, batch.all_xyz, batch.near.nearest(flat, 1)[:, 0]).view(score.shape)
     back = nearest_gap(batch.xyz, flat, Neighbourhood(flat).nearest(batch.xyz, 1)[:, 0])
     return {
         "wrap": weighted_mean(there, score) + weighted_mean(back, back.new_ones(())),
@@ -86,9 +82,9 @@ def upper_terms(
     }
 
 
-def chart_loss(networks: MultiChartPaperNetworks, batch: Batch, lattice: Tensor, config: PaperConfig) -> Tensor:
+def chart_loss(networks: MultiChartPaperNetworks, batch: Batch, config: PaperConfig) -> Tensor:
     """ℓ_local of one step, a scalar."""
     weights = config.chart_weights
     by_name = {"upper_cycle": weights.cycle}
-    terms = chart_terms(networks, batch, lattice, config)
+    terms = chart_terms(networks, batch, config)
     return torch.stack([by_name.get(name, getattr(weights, name, 0.0)) * value for name, value in terms.items()]).sum()

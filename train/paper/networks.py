@@ -46,7 +46,7 @@ class Affine(Dense):
 
 
 def in_precision(x: Tensor, weight: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
-    """x and weight, whose product has the precision of x, in ``dtype``.
+    """Bring x and weight to ``dtype``, so that their product has the precision of x.
 
     float32 coordinates that meet bfloat16 are split into a rounded part and the rest, and so are the weights:
     [x₁, x₂, x₁] [W₁; W₁; W₂] is exact to 2⁻¹⁶, and sums in float32.

@@ -33,7 +33,7 @@ class CosineAdamW:
     """
 
     def __init__(self, module: nn.Module, config: PaperConfig) -> None:
-        self._parameters = list(module.parameters())
+        self._parameters: list[Tensor] = list(module.parameters())
         self._sizes = [parameter.numel() for parameter in self._parameters]
         self._config = config
         device = self._parameters[0].device
@@ -54,5 +54,6 @@ class CosineAdamW:
             self.square.mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
             root = self.square.sqrt().div_(math.sqrt(second)).add_(EPSILON)
             change = (self.mean / root).mul_(-rate / first)
-            for parameter, part in zip(self._parameters, change.split(self._sizes), strict=True):
-                parameter.mul_(1.0 - rate * config.decay).add_(part.view_as(parameter))
+            parts = [part.view_as(own) for part, own in zip(change.split(self._sizes), self._parameters, strict=True)]
+            torch._foreach_mul_(self._parameters, 1.0 - rate * config.decay)  # pyright: ignore[reportPrivateImportUsage]
+            torch._foreach_add_(self._parameters, parts)  # pyright: ignore[reportPrivateImportUsage]

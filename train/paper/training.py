@@ -116,12 +116,11 @@ def train_paper(
     sha = samples.sha256() if checkpoints is not None else ""
     if checkpoints is not None and (state := checkpoints.latest(config, sha)) is not None:
         run.restore(state)
-    lattice = source.lattice
     loss_of = global_loss if config.mode == "global" else chart_loss
     if config.compile and device.type == "cuda":
         compile_parts(run.networks)
     while run.optimizer.taken < config.steps:
-        loss = loss_of(cast("Any", run.networks), source.draw(run.generator), lattice, config)
+        loss = loss_of(cast("Any", run.networks), source.draw(run.generator), config)
         run.optimizer.step(loss)
         done = run.optimizer.taken
         if done % REPORT_EVERY == 0 or done == config.steps:

@@ -35,7 +35,7 @@ def test_a_small_input_is_the_batch() -> None:
     assert samples.faces is not None
     np.testing.assert_array_equal(batch.triangles.numpy(), samples.faces)
     np.testing.assert_allclose(batch.xyz.numpy(), samples.points, atol=1e-6)
-    assert (batch.total, batch.edge_total) == (len(samples.points), 3 * len(samples.faces))
+    assert (len(batch.all_xyz), batch.edge_total) == (len(samples.points), 3 * len(samples.faces))
 
 
 def test_a_drawn_batch_has_distinct_points_and_whole_triangles() -> None:
@@ -75,11 +75,22 @@ def test_each_draw_is_another_and_the_seed_decides() -> None:
     assert torch.equal(first.xyz, again.xyz)
 
 
-def test_the_lattice_covers_the_square() -> None:
-    lattice = BatchSource(sphere(), replace(CONFIG, points=110), CPU).lattice
-    assert lattice.shape == (100, 2)
+def test_the_lattice_of_the_whole_input_spans_the_square() -> None:
+    source = BatchSource(sphere(), replace(CONFIG, points=10_000), CPU)
+    lattice = source.draw(torch.Generator()).lattice
+    assert lattice.shape == (12**2, 2)
     assert lattice.min(dim=0).values.tolist() == [-1.0, -1.0]
     assert lattice.max(dim=0).values.tolist() == [1.0, 1.0]
+
+
+def test_a_drawn_lattice_is_regular_moves_and_stays_inside() -> None:
+    source, generator = BatchSource(sphere(), replace(CONFIG, points=110), CPU), torch.Generator().manual_seed(0)
+    lattices = torch.stack([source.draw(generator).lattice for _ in range(40)])
+    assert lattices.shape == (40, 100, 2)
+    steps = lattices[0, :10, 1].diff()
+    torch.testing.assert_close(steps, torch.full((9,), 0.2))
+    assert lattices.abs().max() <= 1.0
+    assert lattices.std(dim=0).min() > 0.02
 
 
 def test_edges_of_a_cloud_join_near_points() -> None:

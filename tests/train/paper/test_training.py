@@ -157,7 +157,7 @@ def test_each_global_ablation_leaves_its_terms_out(ablation: Ablation, names: se
     config = replace(SMALL, ablation=ablation)
     run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
-    terms = global_terms(run.networks, source.draw(run.generator), source.lattice, config)
+    terms = global_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
     assert all(value.item() > 0.0 for value in terms.values())
 
@@ -174,7 +174,7 @@ def test_each_multi_chart_ablation_adds_its_terms(ablation: Ablation, names: set
     config = replace(SMALL, mode="multi-chart", ablation=ablation)
     run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
     assert isinstance(run.networks, MultiChartPaperNetworks)
-    terms = chart_terms(run.networks, source.draw(run.generator), source.lattice, config)
+    terms = chart_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
     trained = train_paper(surface_input("tube", 16), replace(config, steps=2), silent)
     assert all(value.isfinite().all() for value in trained.parameters())
@@ -185,14 +185,14 @@ def test_weights_multiply_their_terms() -> None:
     run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
     batch = source.draw(run.generator)
-    terms = global_terms(run.networks, batch, source.lattice, config)
+    terms = global_terms(run.networks, batch, config)
     by_hand = sum(
         factor * terms[name].item()
         for name, factor in zip(
             ("unwrap", "wrap", "cycle", "differential", "triangle"), (1, 10, 100, 1e3, 1e4), strict=True
         )
     )
-    assert global_loss(run.networks, batch, source.lattice, config).item() == pytest.approx(by_hand, rel=1e-5)
+    assert global_loss(run.networks, batch, config).item() == pytest.approx(by_hand, rel=1e-5)
 
 
 @pytest.mark.parametrize("oriented", [True, False])
@@ -204,7 +204,7 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
     batch = source.draw(run.generator)
     assert (batch.triangles is None, batch.normal is None) == (True, not oriented)
     if isinstance(run.networks, GlobalNetworks):
-        assert "triangle" not in global_terms(run.networks, batch, source.lattice, config)
+        assert "triangle" not in global_terms(run.networks, batch, config)
     logits, uv = trained(torch.from_numpy(cloud.points).float())
     assert torch.isfinite(logits).all()
     assert torch.isfinite(uv).all()
