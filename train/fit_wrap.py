@@ -178,18 +178,24 @@ def draw_waves(nets: SineNets, index: int, uv: Tensor, area: float, band: float,
     nets.phase[index] = 2.0 * math.pi * phase
 
 
+def penalty(waves: int) -> Tensor:
+    """(waves + 3,) float64: 1 for the sines; for slope and bias only what keeps the equations solvable."""
+    return torch.tensor([1.0, 1e-6], dtype=torch.float64).repeat_interleave(torch.tensor([waves, 3]))
+
+
 @torch.no_grad()
 def solve(nets: SineNets, index: int, uv: Tensor, target: Tensor, weight: Tensor, ridge: float) -> None:
     """Ridge regression of target (n, c) on the hidden layer of network ``index``, weights (n,) of sum 1; in float64.
 
-    Outputs behind the c of the target stay as they are.
+    The ridge holds back the sines alone: what is flat comes back flat.  Outputs behind the c of the target stay as
+    they are.
     """
     design = nets.design(index, uv)
-    size = design.abs().amax(dim=0).clamp(min=1e-300)  # the ridge is to weigh on all columns alike, in any unit of uv
+    size = design.abs().amax(dim=0).clamp(min=1e-300)  # the products are to be of one size, in any unit of uv
     design = design / size
     weighted = (design * weight[:, None]).T
     gram = weighted @ design
-    gram.diagonal().add_(ridge * gram.diagonal().mean())
+    gram.diagonal().add_(ridge * gram.diagonal().mean() * penalty(nets.waves))
     solution = torch.cholesky_solve(weighted @ target, torch.linalg.cholesky(gram)) / size[:, None]
     parts = solution.split([nets.waves, 2, 1])
     for layer, part in zip((nets.last, nets.slope, nets.bias), parts, strict=True):
@@ -267,4 +273,4 @@ def fit_wrap(
     progress("fit points", 1, 2)
     fit_surface(model, samples, scores, config, generator)
     progress("fit points", 2, 2)
-    return model.eval()
+    return model.eval().requires_grad_(False)
