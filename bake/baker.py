@@ -6,16 +6,16 @@ h w texels, row 0 = top · t texels of one call.  `bake` makes Textures in memor
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..runtime.errors import InputError
-from ..runtime.mesh import Asset, Surface
 from .context import open_context
+from .functions import SurfaceFunction, function_map, surface_alone
 from .gbuffer import GBuffer, rasterize
 from .gutter import find_gutter
 from .images import Texture, write_texture
@@ -25,16 +25,14 @@ from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_chang
 from .tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-    from ..runtime.mesh import Atlas
+    from ..runtime.mesh import Asset, Atlas
     from .images import FileType
-    from .tiles import Device
-
-SurfaceFunction = Callable[["NDArray[np.float32]", "NDArray[np.float32]", "NDArray[np.int64]"], "ArrayLike"]
+    from .tiles import BakedWindow, Device
 
 VISIBLE = 0.5 / 255.0
 """Difference across a seam, as a share of a map's range, up to which gutters stay as they are."""
@@ -98,27 +96,41 @@ def bake(
     pixels: dict[str, NDArray[np.float32]] = {}
     if drawn:
         with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
-            covered, inside = np.zeros((2, texels, texels), np.bool_)
-            for baked in map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress):
-                covered[baked.window.rows, baked.window.columns] = baked.covered
-                inside[baked.window.rows, baked.window.columns] = baked.inside
-                for entry in drawn:
-                    part = baked.maps[entry.name]
-                    image = pixels[entry.name] = with_channels(pixels.get(entry.name), part.shape[2], texels, scratch)
-                    target = image[baked.window.rows, baked.window.columns]
-                    background = np.asarray((*entry.background, 1.0)[: part.shape[2]], np.float32)
-                    baked.gutter.fill(part, background, target[..., : part.shape[2]])
-                    target[..., part.shape[2] :] = 1.0
+            baked = map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress)
+            pixels, covered, inside = put_together(baked, drawn, texels, scratch)
         if padding is None:
             gutter = find_gutter(covered, None)
             pixels = {name: gutter.fill(image, image[0, 0]) for name, image in pixels.items()}
         if padding != 0 and tile is None:
             close_seams(atlas, drawn, pixels, inside)
-    for entry in chosen:
-        if entry.everywhere:
-            _announce(progress, entry.name)
-            pixels[entry.name] = computed(entry, blank_gbuffer(texels), atlas, asset)
+    for entry in (entry for entry in chosen if entry.everywhere):
+        _announce(progress, entry.name)
+        pixels[entry.name] = computed(entry, blank_gbuffer(texels), atlas, asset)
     return {entry.name: as_texture(entry, pixels[entry.name]) for entry in chosen}
+
+
+def put_together(
+    windows: Iterable[BakedWindow], entries: Sequence[BakeMap], size: int, scratch: Path | None
+) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Windows → name → image (size, size, c), and which texels hold a surface and lie inside of it, (size, size) bool.
+
+    One window is put into the images while the next is made.
+    """
+    images: dict[str, NDArray[np.float32]] = {}
+    covered, inside = np.zeros((2, size, size), np.bool_)
+    with ThreadPoolExecutor(1) as filler:
+        filled: Future[None] | None = None
+        for baked in windows:
+            if filled is not None:
+                filled.result()
+            for name, part in baked.maps.items():
+                images[name] = with_channels(images.get(name), part.shape[2], size, scratch)
+            covered[baked.window.rows, baked.window.columns] = baked.covered
+            inside[baked.window.rows, baked.window.columns] = baked.inside
+            filled = filler.submit(put_window, baked, entries, dict(images))
+        if filled is not None:
+            filled.result()
+    return images, covered, inside
 
 
 def find_maps(
@@ -128,37 +140,6 @@ def find_maps(
     if isinstance(maps, Mapping):
         return [function_map(name, function) for name, function in maps.items()]
     return [find_map(entry, normal_format=normal_format) if isinstance(entry, str) else entry for entry in maps]
-
-
-def function_map(name: str, function: SurfaceFunction) -> BakeMap:
-    """A map out of a function of positions, normals and face numbers, which is called with many texels at a time.
-
-    Any space and range; linear, EXR float (1 to 4 channels).
-    """
-
-    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-        del atlas, asset
-        position, normal = gbuffer.position.reshape(-1, 3), gbuffer.normal.reshape(-1, 3)
-        face, result = gbuffer.face.reshape(-1), None
-        for texels in gbuffer.chunks():
-            values = np.asarray(function(position[texels], normal[texels], face[texels].astype(np.int64)), np.float32)
-            if values.ndim not in (1, 2) or len(values) != len(texels):
-                expected = f"({len(texels)},) or ({len(texels)}, 1 to 4)"
-                raise InputError(f"map {name}: its function returned {values.shape}; expected {expected}")
-            values = values.reshape(len(texels), -1)
-            result = np.zeros((face.size, values.shape[1]), np.float32) if result is None else result
-            result[texels] = values
-        return (np.zeros((face.size, 1), np.float32) if result is None else result).reshape(*gbuffer.shape, -1)
-
-    return BakeMap(name, "any", "any", "any", "linear", "exr", 32, compute, (0.0, 0.0, 0.0))
-
-
-def surface_alone(atlas: Atlas) -> Asset:
-    """The atlas' own mesh as an asset without colours and textures, in the atlas' vertices."""
-    surface = Surface(atlas.positions, atlas.faces)
-    return Asset(
-        atlas.positions, atlas.faces, np.arange(len(atlas.positions)), surface, normals=atlas.normals.astype(np.float64)
-    )
 
 
 def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int32]:
@@ -172,6 +153,16 @@ def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
     check_size(size)
     with open_context() as context:
         return rasterize(context, atlas, size)
+
+
+def put_window(baked: BakedWindow, entries: Sequence[BakeMap], images: Mapping[str, NDArray[np.float32]]) -> None:
+    """The maps of a window into the images, gutters filled."""
+    for entry in entries:
+        part = baked.maps[entry.name]
+        target = images[entry.name][baked.window.rows, baked.window.columns]
+        background = np.asarray((*entry.background, 1.0)[: part.shape[2]], np.float32)
+        baked.gutter.fill(part, background, target[..., : part.shape[2]])
+        target[..., part.shape[2] :] = 1.0
 
 
 def with_channels(
@@ -213,7 +204,8 @@ def close_seams(
         if error is not None and error.maximum > VISIBLE:
             texel, change = seam_changes(image, samples, inside)
             row, column = np.divmod(texel, len(inside))
-            image[row, column] += change
+            low, high = {"[0, 1]": (0.0, 1.0), "[-1, 1]": (-1.0, 1.0)}.get(entry.value_range, (-np.inf, np.inf))
+            image[row, column] = np.clip(image[row, column] + change, low, high)
 
 
 def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:

@@ -95,8 +95,11 @@ class GBuffer:
     @property
     def inside(self) -> NDArray[np.bool_]:
         """(h, w) bool: texels whose centres lie in a face, not merely near the border of a chart."""
-        least = np.minimum(np.minimum(self.second, self.third), 1.0 - self.second - self.third)
-        return (self.face >= 0) & (least > 0.5 * LEAST)
+        edge = 0.5 * LEAST
+        inside = self.second > edge
+        inside &= self.third > edge
+        inside &= self.second + self.third < 1.0 - edge
+        return inside
 
     def image_texels(self, texels: NDArray[np.int64]) -> NDArray[np.int64]:
         """(t,) int64 flat indices in the whole image of flat indices in this window: seeds that no window changes."""

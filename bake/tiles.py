@@ -139,7 +139,7 @@ def map_windows(
     asset: Asset,
     progress: Callable[[str], None] | None = None,
 ) -> Iterator[BakedWindow]:
-    """Window by window, every map.
+    """Window by window, every map.  What was yielded is not changed by the next window.
 
     progress: called with each map's name before it is made the first time.
     Raises: InputError when a map's function returns another shape than (h, w, 1 to 4).
@@ -156,7 +156,9 @@ def map_windows(
         for entry in entries:
             if progress is not None and number == 0:
                 progress(entry.name)
-            maps[entry.name] = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
+            pixels = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
+            kept = any(np.may_share_memory(pixels, plane) for plane in planes)
+            maps[entry.name] = pixels.copy() if kept else pixels
         inside = gbuffer.inside if plan.along == 1 else ~covered_texels(~gbuffer.inside, plan.along)
         gutter = find_gutter(covered, plan.halo).part(rows, columns)
         yield BakedWindow(window, covered[rows, columns], inside[rows, columns], gutter, maps)
