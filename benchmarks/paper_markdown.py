@@ -45,8 +45,8 @@ QUANTITIES = {
         "conformal_mean", "conformality", "{:.4f}", 1.0, True,
         "`conformal_mean`: mean over faces of the mean |angle − uv angle| of the three corners, radians. Paper: “the "
         "average absolute angular difference between corresponding triangles”, unit not stated, radians assumed. Ours "
-        "counts every face of the finished atlas; rows marked raw are the network's own map before it is finished, which "
-        "is what the paper measures: in global mode over all faces, and over those that don't cross the learned seam; in "
+        "counts every face of the finished atlas; rows marked raw are the network's own map before it is finished, as "
+        "the paper measures it: in global mode over all faces, and over those that don't cross the learned seam; in "
         "multi-chart mode over the faces whose corners are in one chart.",
     ),
     "isometric": Quantity(
