@@ -25,7 +25,7 @@ class CloudConfig:
     tree_neighbours: int = 10
     """Nearest points along whose links orientation spreads."""
     unruly: float = 0.2
-    """Share of neighbouring normals that may disagree before the normals of a file are oriented anew."""
+    """`normals.disagreement` from which on the normals of a file are oriented anew (random signs have 0.5)."""
     opposite: float = -0.3
     """Points whose normals have a smaller cosine are no neighbours: they lie on the other side of a thin sheet."""
     steep: float = 0.2

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from .cloudconfig import CloudConfig
 
+_LONGEST = 4  # how many small holes may hang together at vertices
+
 
 def hole_triangles(
     points: NDArray[np.float64],
@@ -36,8 +38,8 @@ def hole_triangles(
         faces: (f, 3) int64.
         config: hole_edges, hole_width and facing.
     """
-    loops = [loop[::-1] for loop in boundary_loops(faces) if len(loop) <= config.hole_edges]
-    loops = [loop for loop in loops if len(np.unique(loop)) == len(loop)]
+    whole = [loop for loop in boundary_loops(faces) if len(loop) <= _LONGEST * config.hole_edges]
+    loops = [simple[::-1] for loop in whole for simple in simple_loops(loop) if 3 <= len(simple) <= config.hole_edges]
     taken = set(_edge_keys(faces, len(points)).tolist())
     closed: list[NDArray[np.int64]] = [np.zeros((0, 3), dtype=np.int64)]
     for length in sorted({len(loop) for loop in loops}):
@@ -51,6 +53,21 @@ def hole_triangles(
                 taken |= diagonals
                 closed.append(triangles)
     return np.concatenate(closed)
+
+
+def simple_loops(loop: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """A closed loop (n,) taken apart where it comes back to a vertex: holes that touch there."""
+    if len(np.unique(loop)) == len(loop):
+        return [loop]
+    done: list[NDArray[np.int64]] = []
+    path: list[int] = []
+    for vertex in loop.tolist():
+        if vertex in path:
+            start = path.index(vertex)
+            done.append(np.array(path[start:], dtype=np.int64))
+            del path[start:]
+        path.append(vertex)
+    return [*done, np.array(path, dtype=np.int64)]
 
 
 def _edge_keys(faces: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -158,10 +158,23 @@ def turned_to(
 
 
 def disagreement(points: NDArray[np.float64], normals: NDArray[np.float64], index: NDArray[np.int64]) -> float:
-    """Share of links to neighbours (d, k) across which given normals (d, 3) turn over; 0.5 for random signs."""
-    agreement = _links(points, normals, index)[2]
-    decided = np.abs(agreement) > 0.5
-    return float((agreement[decided] < 0.0).mean()) if decided.any() else 0.0
+    """How far given normals are from an orientation: 0 consistent, 0.5 random signs.
+
+    The share of links to neighbours across which normals turn over, times 1 − |mean side of the other point|: across a
+    thin sheet they turn over too, but there the other point always lies below the tangent plane (across a gap, above).
+
+    Args:
+        points: (d, 3) float64.
+        normals: (d, 3) float64 unit or zero.
+        index: (d, k) int64 neighbours.
+    """
+    one, other, agreement = _links(points, normals, index)
+    turned = agreement < -0.5
+    if not turned.any():
+        return 0.0
+    way = points[other[turned]] - points[one[turned]]
+    side = np.sign(np.einsum("mc,mc->m", way, normals[one[turned]]))
+    return float(turned.sum() / np.count_nonzero(np.abs(agreement) > 0.5) * (1.0 - np.abs(side.mean())))
 
 
 def _links(
