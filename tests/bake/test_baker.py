@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import moderngl
 import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake, make_gbuffer, texture_names, write_textures
+from flexpara.bake.context import open_context
 from flexpara.bake.gbuffer import GBuffer
 from flexpara.bake.images import read_image
 from flexpara.bake.maps import BakeMap, find_map
@@ -135,6 +139,29 @@ def test_images_kept_on_disk_are_the_same_and_leave_no_file(sphere: Pair, tmp_pa
         np.testing.assert_array_equal(disk[name].pixels, memory[name].pixels)
     paths = [write_textures(textures, tmp_path, stem) for textures, stem in ((memory, "a"), (disk, "b"))]
     assert [path.read_bytes() for path in paths[0]] == [path.read_bytes() for path in paths[1]]
+
+
+def test_a_bake_leaves_neither_errors_nor_objects_on_the_device(
+    sphere: Pair, monkeypatch: pytest.MonkeyPatch, leaks: Callable[[moderngl.Context], list[str]]
+) -> None:
+    opened: list[moderngl.Context] = []
+
+    @contextmanager
+    def watched() -> Iterator[moderngl.Context]:
+        with open_context() as context:
+            context.gc_mode = "context_gc"
+            opened.append(context)
+            yield context
+            assert context.error == "GL_NO_ERROR"
+            assert leaks(context) == []
+
+    monkeypatch.setattr("flexpara.bake.tiles.open_context", watched)
+    bake(*sphere, ["position", "normal", "face-id"], size=50, padding=2, samples=4, limit=40)
+    with pytest.raises(InputError, match="uv span"):
+        bake(replace(sphere[0], uv=sphere[0].uv * 3), sphere[1], ["position"], size=50)
+    with pytest.raises(InputError, match="its function returned"):
+        bake(*sphere, [custom(np.zeros((3, 3, 1)))], size=50, limit=20)
+    assert len(opened) == 2
 
 
 @pytest.mark.parametrize("limit", [24, 31, 60])
