@@ -76,30 +76,33 @@ def reconstruct(cloud: PointCloud, config: CloudConfig | None = None) -> CloudMe
     vertex = np.full(len(distinct.first), -1, dtype=np.int64)
     vertex[local.chosen[used]] = np.arange(len(used))
     face, weight = _places(surface, distinct, vertex, config.extrapolation)
-    pieces = int(components(surface.faces).max()) + 1
     known = with_changes(
         cloud,
         repeated_points=len(cloud.points) - len(distinct.points),
         points_without_triangle=int(np.count_nonzero(vertex < 0)),
         reoriented_normals=len(distinct.points) if local.reoriented else 0,
-        components=pieces if pieces > 1 else 0,
     )
-    shown = local.normals[used]
-    if distinct.normals is not None and not local.reoriented:
-        own = distinct.normals[local.chosen[used]]
-        shown = np.where(np.linalg.norm(own, axis=1, keepdims=True) > 0.0, own, shown)
-    asset = Asset(
+    asset = _asset(known, surface, user, local.normals[used], local.reoriented)
+    return CloudMesh(asset, face[distinct.weld], weight[distinct.weld])
+
+
+def _asset(
+    cloud: PointCloud, surface: Surface, user: NDArray[np.int64], fitted: NDArray[np.float64], reoriented: bool
+) -> Asset:
+    """The surface as an Asset: vertex i is point user[i]; the file's normals where known and not turned."""
+    own = fitted if cloud.normals is None or reoriented else cloud.normals[user]
+    pieces = int(components(surface.faces).max()) + 1
+    return Asset(
         positions=surface.vertices,
         faces=surface.faces,
-        weld=np.arange(len(used)),
+        weld=np.arange(len(user)),
         surface=surface,
-        normals=shown,
+        normals=np.where(np.linalg.norm(own, axis=1, keepdims=True) > 0.0, own, fitted),
         colors=None if cloud.colors is None else cloud.colors[user],
-        changes=known.changes,
+        changes=with_changes(cloud, components=pieces if pieces > 1 else 0).changes,
         sha256=cloud.sha256,
         stem=cloud.stem,
     )
-    return CloudMesh(asset, face[distinct.weld], weight[distinct.weld])
 
 
 def _local(distinct: DistinctPoints, config: CloudConfig) -> _Local:

@@ -166,7 +166,10 @@ def test_given_normals_keep_their_side_and_random_ones_are_oriented_anew() -> No
 def test_repeated_points_and_outliers_are_answered_for() -> None:
     points = surface_samples("torus", 2000)
     more = np.concatenate([points[5:6], points, points[:100], [[4.0, 0.0, 0.0]], points[:1] + 1e-5])
-    mesh = reconstruct(cloud_from_arrays(more, colors=np.full((len(more), 4), 9, dtype=np.uint8)))
+    mesh = reconstruct(
+        cloud_from_arrays(more, stem="ring", sha256="abc", colors=np.full((len(more), 4), 9, dtype=np.uint8))
+    )
+    assert (mesh.asset.stem, mesh.asset.sha256) == ("ring", "abc")
     assert mesh.asset.changes["repeated_points"] == 101
     assert mesh.asset.changes["points_without_triangle"] >= 2
     assert mesh.asset.colors is not None
@@ -181,9 +184,10 @@ def test_repeated_points_and_outliers_are_answered_for() -> None:
 
 def test_points_that_make_no_triangle_are_refused_in_one_line() -> None:
     line = np.linspace(0.0, 1.0, 50)[:, None] * [[1.0, 2.0, 3.0]]
-    with pytest.raises(MeshError, match="50 points make no triangles") as caught:
-        reconstruct(cloud_from_arrays(line))
-    assert "\n" not in str(caught.value)
+    for points, count in ((line, 50), (line[[0, 0, 9, 9, 9]], 2), (line[[0, 0, 3, 9, 9]], 3)):
+        with pytest.raises(MeshError, match=f"{count} points make no triangles") as caught:
+            reconstruct(cloud_from_arrays(points))
+        assert "\n" not in str(caught.value)
 
 
 def test_a_bent_sheet_is_unrolled_to_its_own_coordinates_with_and_without_normals() -> None:
