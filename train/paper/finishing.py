@@ -38,7 +38,6 @@ from .seams import SeamConfig, seam_edges, tears
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..config import ContactConfig
     from ..finish import Stage
     from ..labels import DualGraph
 
@@ -60,7 +59,9 @@ class GlobalFinishConfig:
     steps: int = 30
     """Steps of SLIM with contacts, where the chart would overlap: long cuts need more of them than slits do."""
     conformal: int = 20
-    """SLIM iterations of conformal energy at the end; 0 leaves the isometric map."""
+    """SLIM iterations of conformal energy at the end, at most; 0 leaves the isometric map."""
+    enough: float = 0.02
+    """Conformality (radians) at which they end: a third of the paper's; below, areas are worth more than angles."""
 
 
 class Opened(NamedTuple):
@@ -154,6 +155,8 @@ def open_along_seam(
 
 def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> tuple[Slit, ...]:
     """The slits that pay, by the disk's simplified twin; none where the twin has no valid start."""
+    if config.slits == 0:
+        return ()
     twin = simplified(disk, config.twin_faces)
     loops = boundary_loops(twin.faces)
     start = circle_start(twin) if len(loops) == 1 else None
@@ -181,7 +184,7 @@ def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfi
     if not states:
         return None, "none"
     name = min(states, key=lambda name: excess_energy(disk, states[name].uv))
-    return Flat(disk, conformal_steps(disk, states[name], config.conformal, contact), {}), name
+    return Flat(disk, conformal_steps(disk, states[name], config), {}), name
 
 
 def learned_start(opened: Opened, rounds: int = 6) -> NDArray[np.float64] | None:
@@ -237,13 +240,14 @@ def circle_start(disk: Surface) -> NDArray[np.float64] | None:
     return uv if np.isfinite(uv).all() and not flipped_triangles(uv[disk.faces]).any() else None
 
 
-def conformal_steps(disk: Surface, state: Relaxed, iterations: int, contact: ContactConfig) -> NDArray[np.float64]:
+def conformal_steps(disk: Surface, state: Relaxed, config: GlobalFinishConfig) -> NDArray[np.float64]:
     """The uv (v, 2) after SLIM with conformal energy, at the surface's scale; ``state`` where no valid end is found.
 
     From an isometric map that took its slits, angles improve fast and areas give way a little; from a map that is far
     from isometric, areas would vary without bound, so the iterations are few.  Overlap that comes on the way mostly
     goes again: the last valid state counts, and contacts take apart what is left at the end.
     """
+    contact = config.finish.relief.contact
     solver = igl.slim_precompute(
         np.asfortranarray(disk.vertices),
         np.asfortranarray(disk.faces.astype(np.int32)),
@@ -254,8 +258,10 @@ def conformal_steps(disk: Surface, state: Relaxed, iterations: int, contact: Con
         0.0,
     )
     best = uv = state.uv
-    for _ in range(iterations // contact.block):
-        uv = np.ascontiguousarray(igl.slim_solve(solver, contact.block))
+    for _ in range(config.conformal // contact.iterations):
+        if best is uv and angle_error(disk, best) < config.enough:
+            break
+        uv = np.ascontiguousarray(igl.slim_solve(solver, contact.iterations))
         uv = uv * np.sqrt(disk.face_areas().sum() / np.abs(signed_areas(uv[disk.faces])).sum())
         if is_valid(disk, uv):
             best = uv

@@ -206,7 +206,7 @@ def distortions(triangles: NDArray[np.float64], uv: NDArray[np.float64]) -> dict
 
 def finished_figures(surface: Surface, charts: Charts, finished: Finished) -> dict[str, Any]:
     """Figures of the charts that come back, as `flexpara evaluate` has them, and how they came to be."""
-    found = measure(surface, charts.corner_uv, charts.face_chart).to_dict()
+    found = measure(surface, side_by_side(charts), charts.face_chart).to_dict()
     names = ("conformal_mean", "equiareal_mean", "isometric_mean", "symmetric_dirichlet_mean", "seam_length", "charts")
     return {name: found[name] for name in (*names, "flipped_faces", "overlap_fraction")} | {
         "patches": len(charts.patch_chart),
@@ -214,3 +214,14 @@ def finished_figures(surface: Surface, charts: Charts, finished: Finished) -> di
         "slit_length": sum(piece.slits for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
+
+
+def side_by_side(charts: Charts) -> NDArray[np.float64]:
+    """(f, 3, 2) corner uv with the charts moved apart along u: each has coordinates of its own until it is packed."""
+    low = np.full(len(charts.method), np.inf)
+    np.minimum.at(low, charts.face_chart, charts.corner_uv[..., 0].min(axis=1))
+    high = np.full(len(charts.method), -np.inf)
+    np.maximum.at(high, charts.face_chart, charts.corner_uv[..., 0].max(axis=1))
+    wide = 1.01 * (high - low)
+    shift = np.append(0.0, np.cumsum(wide)[:-1]) - low
+    return charts.corner_uv + shift[charts.face_chart][:, None, None] * [1.0, 0.0]

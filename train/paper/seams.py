@@ -103,7 +103,8 @@ def tears(piece: Surface, uv: NDArray[np.float64], config: SeamConfig, table: Ed
     apart = np.linalg.norm(centre[i] - middle, axis=1) + np.linalg.norm(centre[j] - middle, axis=1)
     stretch = np.linalg.norm(flat[i] - flat[j], axis=1) / np.maximum(apart, 1e-300)
     edge = np.zeros(len(table.edges))
-    edge[inside] = stretch / np.maximum(usual_stretch(piece, uv, middle, config), 1e-300)
+    least = 1e-6 * float(stretch.max(initial=0.0)) + 1e-300  # a map that collapses has no usual stretch
+    edge[inside] = stretch / np.maximum(usual_stretch(piece, uv, middle, config), least)
     band = np.zeros(len(piece.vertices), dtype=bool)
     band[table.edges[edge > config.torn]] = True
     return Tears(edge, edge[table.face_edges].max(axis=1), band)
