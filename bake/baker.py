@@ -17,7 +17,7 @@ from ..runtime.errors import InputError
 from .context import open_context
 from .functions import SurfaceFunction, function_map, surface_alone
 from .gbuffer import GBuffer, rasterize
-from .gutter import find_gutter
+from .gutter import check_padding, fill_gutters
 from .images import Texture, write_texture
 from .layout import check_size
 from .maps import BakeMap, NormalFormat, find_map
@@ -89,18 +89,17 @@ def bake(
     if not chosen:
         return {}
     texels = atlas.size if size is None else size
-    if texels < 1:
-        raise InputError(f"size {texels}: expected 1 texel or more per side; pass size=, for instance 2048")
-    plan = Plan(texels, 0 if padding is None else padding, samples, limit, tile)
+    check_size(texels)
+    check_padding(padding)
+    plan = Plan(texels, samples, limit, tile)
     drawn = [entry for entry in chosen if not entry.everywhere]
     pixels: dict[str, NDArray[np.float32]] = {}
     if drawn:
         with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
             baked = map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress)
-            pixels, covered, inside = put_together(baked, drawn, texels, scratch)
-        if padding is None:
-            gutter = find_gutter(covered, None)
-            pixels = {name: gutter.fill(image, image[0, 0]) for name, image in pixels.items()}
+            pixels, covered, inside = put_together(baked, texels, scratch)
+        images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in drawn]
+        fill_gutters(images, covered, padding)
         if padding != 0 and tile is None:
             close_seams(atlas, drawn, pixels, inside)
     for entry in (entry for entry in chosen if entry.everywhere):
@@ -110,7 +109,7 @@ def bake(
 
 
 def put_together(
-    windows: Iterable[BakedWindow], entries: Sequence[BakeMap], size: int, scratch: Path | None
+    windows: Iterable[BakedWindow], size: int, scratch: Path | None
 ) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_], NDArray[np.bool_]]:
     """Windows → name → image (size, size, c), and which texels hold a surface and lie inside of it, (size, size) bool.
 
@@ -127,7 +126,7 @@ def put_together(
                 images[name] = with_channels(images.get(name), part.shape[2], size, scratch)
             covered[baked.window.rows, baked.window.columns] = baked.covered
             inside[baked.window.rows, baked.window.columns] = baked.inside
-            filled = filler.submit(put_window, baked, entries, dict(images))
+            filled = filler.submit(put_window, baked, dict(images))
         if filled is not None:
             filled.result()
     return images, covered, inside
@@ -155,14 +154,17 @@ def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
         return rasterize(context, atlas, size)
 
 
-def put_window(baked: BakedWindow, entries: Sequence[BakeMap], images: Mapping[str, NDArray[np.float32]]) -> None:
-    """The maps of a window into the images, gutters filled."""
-    for entry in entries:
-        part = baked.maps[entry.name]
-        target = images[entry.name][baked.window.rows, baked.window.columns]
-        background = np.asarray((*entry.background, 1.0)[: part.shape[2]], np.float32)
-        baked.gutter.fill(part, background, target[..., : part.shape[2]])
+def put_window(baked: BakedWindow, images: Mapping[str, NDArray[np.float32]]) -> None:
+    """The maps of a window into the images; alpha is 1 where the window has none."""
+    for name, part in baked.maps.items():
+        target = images[name][baked.window.rows, baked.window.columns]
+        target[..., : part.shape[2]] = part
         target[..., part.shape[2] :] = 1.0
+
+
+def background_of(entry: BakeMap, image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(c,) float32: what lies beyond gutters, in as many channels as the image has."""
+    return np.asarray((*entry.background, 1.0)[: image.shape[2]], np.float32)
 
 
 def with_channels(

@@ -7,6 +7,8 @@ image, with a halo as wide as the radius, gives what the whole image gives.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,10 +18,14 @@ from scipy import ndimage
 from ..runtime.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 
 FAR = 127
+BAND = 1 << 20
+"""Texels whose gutters are searched together."""
 MOST_NEAR = 96
 """Texels: up to this radius the search near charts is cheaper than a distance transform of the whole image."""
 
@@ -38,8 +44,8 @@ class Gutter:
 
     def fill(self, pixels: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:
         """(h, w, c) float32 and a background (c,) → a new array with gutters filled and background beyond them."""
-        filled = np.zeros(pixels.shape, np.float32)
-        self.part(slice(pixels.shape[0]), slice(pixels.shape[1])).fill(pixels, background, filled)
+        filled = np.array(pixels, np.float32, order="C")
+        self.part(slice(pixels.shape[0]), slice(pixels.shape[1])).fill(filled, background)
         return filled
 
     def part(self, rows: slice, columns: slice) -> GutterPart:
@@ -67,11 +73,32 @@ class GutterPart:
     source: NDArray[np.int64]
     beyond: NDArray[np.bool_]
 
-    def fill(self, pixels: NDArray[np.float32], background: NDArray[np.float32], into: NDArray[np.float32]) -> None:
-        """Put that part of pixels (h, w, c), filled, into an array (high, wide, c)."""
-        into[...] = pixels[self.rows, self.columns]
-        into[self.beyond] = background
-        into[self.row, self.column] = pixels[np.divmod(self.source, pixels.shape[1])]
+    def fill(self, image: NDArray[np.float32], background: NDArray[np.float32]) -> None:
+        """Fill that part of the image (h, w, c) in place.  What is read, covered texels, is not changed."""
+        part = image[self.rows, self.columns]
+        part[self.beyond] = background
+        part[self.row, self.column] = image[np.divmod(self.source, image.shape[1])]
+
+
+def fill_gutters(
+    images: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]], covered: NDArray[np.bool_], radius: int | None
+) -> None:
+    """Fill images (h, w, c), each with its background (c,), in place; covered: (h, w) bool; radius as `find_gutter`.
+
+    Band by band on all cores, each with a halo of the radius: the same as all at once, with less memory.
+    """
+    height, width = covered.shape
+    band = height if radius is None else max(BAND // width, radius, 1)
+
+    def fill(top: int) -> None:
+        halo, bottom = radius or 0, min(top + band, height)
+        first, last = max(top - halo, 0), min(bottom + halo, height)
+        part = find_gutter(covered[first:last], radius).part(slice(top - first, bottom - first), slice(width))
+        for image, background in images:
+            part.fill(image[first:last], background)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(fill, range(0, height, band)))  # list: waits, and raises what was raised
 
 
 def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
@@ -80,8 +107,7 @@ def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
     covered: (h, w) bool.  radius: texels; None fills the whole image.  Nothing covered: nothing to fill.
     Raises: InputError for a negative radius.
     """
-    if radius is not None and radius < 0:
-        raise InputError(f"padding {radius}: expected 0 texels or more, or None for the whole image")
+    check_padding(radius)
     none = np.zeros(0, np.int64)
     if radius == 0 or not covered.any():
         return Gutter(target=none, source=none, beyond=~covered)
@@ -92,6 +118,12 @@ def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
     beyond = ~covered
     beyond.reshape(-1)[target] = False
     return Gutter(target=target, source=source, beyond=beyond)
+
+
+def check_padding(radius: int | None) -> None:
+    """Raise InputError for a negative radius."""
+    if radius is not None and radius < 0:
+        raise InputError(f"padding {radius}: expected 0 texels or more, or None for the whole image")
 
 
 def _by_transform(covered: NDArray[np.bool_], radius: int | None) -> Gutter:

@@ -47,17 +47,6 @@ class Window:
         """The same window of an image `by` times as large."""
         return Window(by * self.row, by * self.column, by * self.height, by * self.width)
 
-    def within(self, other: Window) -> tuple[slice, slice]:
-        """Its rows and columns in an array of the other window, which holds it."""
-        row, column = self.row - other.row, self.column - other.column
-        return slice(row, row + self.height), slice(column, column + self.width)
-
-    def grown(self, by: int, size: int) -> Window:
-        """The window with `by` texels more all round, cut to the image of size × size."""
-        row, column = max(self.row - by, 0), max(self.column - by, 0)
-        bottom, right = min(self.row + self.height + by, size), min(self.column + self.width + by, size)
-        return Window(row, column, bottom - row, right - column)
-
 
 def windows(size: int, side: int, texels: int) -> list[Window]:
     """The image of size × size in windows, row by row: at most `side` wide and high, about `texels` texels each.

@@ -1,7 +1,6 @@
 """Maps window by window: what is drawn at once is bounded, whatever the size of the image.
 
-h w texels · k samples along a texel's side.  A window is drawn with a halo as wide as the padding, so that its gutters
-come out as they would in the whole image.  The arrays that windows are drawn into are used again for the next window.
+h w texels · k samples along a texel's side.  The arrays that windows are drawn into are used again for the next window.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import numpy as np
 from ..runtime.errors import InputError, MissingDependencyError
 from .context import max_texture_size, open_context
 from .gbuffer import DeviceRasterizer, GBuffer
-from .gutter import GutterPart, find_gutter
 from .layout import Layout, Planes, Window, check_size, windows
 from .software import SoftwareRasterizer
 from .supersample import averaged, covered_texels, first_covered, samples_along
@@ -52,7 +50,7 @@ class Rasterizer(Protocol):
 class Plan:
     """How an image is cut into windows.
 
-    size: texels per side.  halo: texels around each window that are drawn with it.  samples: 1, 4 or 16 per texel.
+    size: texels per side.  samples: 1, 4 or 16 per texel.
     limit: the largest side that is drawn at once, in samples; None leaves it to the device.
     tile: the UDIM tile (a, b), uv [a, a + 1] × [b, b + 1]; None is the unit square, and uv must be inside.
 
@@ -60,7 +58,6 @@ class Plan:
     """
 
     size: int
-    halo: int = 0
     samples: int = 1
     limit: int | None = None
     tile: tuple[int, int] | None = None
@@ -68,8 +65,6 @@ class Plan:
     def __post_init__(self) -> None:
         check_size(self.size)
         check_size(self.size * self.along)
-        if self.halo < 0:
-            raise InputError(f"padding {self.halo}: expected 0 texels or more, or None for the whole image")
 
     @property
     def along(self) -> int:
@@ -77,28 +72,15 @@ class Plan:
         return samples_along(self.samples)
 
     def windows(self, device_limit: int) -> list[Window]:
-        """Windows of the image, in texels, without their halo.
-
-        Raises: InputError where the limit leaves nothing beside the halo.
-        """
+        """Windows of the image, in texels.  Raises: InputError where the limit is less than a texel."""
         most = min(self.limit or device_limit, device_limit)
-        side = most // self.along
-        if side < self.size:
-            side -= 2 * self.halo
-        if side < 1:
-            raise InputError(
-                f"padding {self.halo}: too wide to be drawn {most} samples at a time; choose a smaller one"
-            )
-        return windows(self.size, side, max(WINDOW // self.along**2, 1))
-
-    def drawn(self, window: Window) -> Window:
-        """The window with its halo, in texels."""
-        return window.grown(self.halo, self.size)
+        if most < self.along:
+            raise InputError(f"limit {most}: expected at least {self.along}, the samples along a texel")
+        return windows(self.size, most // self.along, max(WINDOW // self.along**2, 1))
 
     def capacity(self, pieces: Sequence[Window]) -> tuple[int, int]:
-        """Height and width of the largest window with halo, in samples."""
-        grown = [self.drawn(window) for window in pieces]
-        return self.along * max(w.height for w in grown), self.along * max(w.width for w in grown)
+        """Height and width of the largest window, in samples."""
+        return self.along * max(w.height for w in pieces), self.along * max(w.width for w in pieces)
 
 
 @contextmanager
@@ -146,12 +128,10 @@ def map_windows(
     """
     planes = Planes.of(*plan.capacity(pieces))
     for number, window in enumerate(pieces):
-        wide = plan.drawn(window)
-        fine = wide.scaled(plan.along)
+        fine = window.scaled(plan.along)
         gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width))
         held = gbuffer.face >= 0
         covered = covered_texels(held, plan.along) if plan.along > 1 else held
-        rows, columns = window.within(wide)
         maps: dict[str, NDArray[np.float32]] = {}
         for entry in entries:
             if progress is not None and number == 0:
@@ -160,8 +140,7 @@ def map_windows(
             kept = any(np.may_share_memory(pixels, plane) for plane in planes)
             maps[entry.name] = pixels.copy() if kept else pixels
         inside = gbuffer.inside if plan.along == 1 else ~covered_texels(~gbuffer.inside, plan.along)
-        gutter = find_gutter(covered, plan.halo).part(rows, columns)
-        yield BakedWindow(window, covered[rows, columns], inside[rows, columns], gutter, maps)
+        yield BakedWindow(window, covered, inside, maps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,13 +148,12 @@ class BakedWindow:
     """The maps of a window.
 
     covered: (h, w) bool, which texels hold a surface.  inside: (h, w) bool, those whose samples all lie in faces.
-    maps: name → pixels of the window with its halo, before gutters; gutter.fill takes the halo off.
+    maps: name → (h, w, c) pixels, before gutters.
     """
 
     window: Window
     covered: NDArray[np.bool_]
     inside: NDArray[np.bool_]
-    gutter: GutterPart
     maps: dict[str, NDArray[np.float32]]
 
 

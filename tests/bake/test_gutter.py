@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexpara.bake.gutter import find_gutter
+from flexpara.bake.gutter import fill_gutters, find_gutter
 from flexpara.runtime.errors import InputError
 
 BACKGROUND = np.array([9.0], np.float32)
@@ -41,15 +41,18 @@ def test_the_source_is_a_nearest_covered_texel(radius: int | None) -> None:
     assert len(gutter.target) + gutter.beyond.sum() == (~covered).sum()
 
 
-def test_a_part_of_an_image_is_filled_like_the_whole() -> None:
+@pytest.mark.parametrize("radius", [0, 1, 4, 11, None])
+def test_bands_fill_what_the_whole_image_fills(radius: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
-    covered = rng.random((40, 50)) < 0.02
-    pixels = rng.random((40, 50, 2), np.float32)
-    gutter, background = find_gutter(covered, 4), np.array([9.0, 8.0], np.float32)
-    rows, columns = slice(7, 31), slice(3, 44)
-    into = np.zeros((24, 41, 2), np.float32)
-    gutter.part(rows, columns).fill(pixels, background, into)
-    np.testing.assert_array_equal(into, gutter.fill(pixels, background)[rows, columns])
+    covered = rng.random((60, 50)) < 0.02
+    pixels = rng.random((60, 50, 2), np.float32)
+    background = np.array([9.0, 8.0], np.float32)
+    expected = find_gutter(covered, radius).fill(pixels, background)
+    monkeypatch.setattr("flexpara.bake.gutter.BAND", 350)
+    single = pixels[..., :1].copy()
+    fill_gutters([(pixels, background), (single, background[:1])], covered, radius)
+    np.testing.assert_array_equal(pixels, expected)
+    np.testing.assert_array_equal(single, expected[..., :1])
 
 
 def test_a_window_with_a_halo_finds_what_the_whole_image_finds() -> None:
