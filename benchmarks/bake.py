@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import subprocess
 import sys
 import tempfile
 import time
@@ -106,7 +107,7 @@ def bare_embreex(surface: Surface, rays: Iterator[tuple[Any, Any]]) -> tuple[int
     return count, seconds
 
 
-def occlusion_rows(atlas: Atlas, asset: Asset, size: int, count: int) -> Iterator[Row]:
+def occlusion_rows(atlas: Atlas, asset: Asset, size: int, count: int, blender: str | None) -> Iterator[Row]:
     """Rays a second.  The image is baked in bands, the bare loop before and after each: other work hits both alike."""
     work = f"AO {size}², {count} rays"
     scene, whole = RayScene.of(asset.surface), make_gbuffer(atlas, size)
@@ -122,9 +123,38 @@ def occlusion_rows(atlas: Atlas, asset: Asset, size: int, count: int) -> Iterato
         rays, seconds = bare_embreex(asset.surface, batches(whole, atlas, asset, count))
         yield Row(work, "embreex, bare loop", rate=rays / seconds / 1e6)
     yield Row(work, "lagrange, bare loop", rate=bare[0] / bare[1] / 1e6)
+    if blender:
+        _, seconds = by_blender(blender, atlas, asset, None, size=size, samples=count, reach=0.0)
+        yield Row(work, "Blender, Cycles", seconds, own[0] / seconds / 1e6, bar=f"flexpara × {seconds / own[1]:.1f}")
     share = float((own[0] / own[1]) / (bare[0] / bare[1]))
     bar = f"≥ {SHARE_BAR} × lagrange: {'met' if share >= SHARE_BAR else 'missed'}"
     yield Row(work, "flexpara", float(own[1]), float(own[0] / own[1] / 1e6), share, bar=bar)
+
+
+def by_blender(
+    python: str, atlas: Atlas, asset: Asset, high: Asset | None, *, size: int, samples: int, reach: float
+) -> tuple[NDArray[np.float32], float]:
+    """(image (h, w, 3), seconds) of Cycles on the CPU: ambient occlusion, or tangent-space normals of `high`."""
+    surface, none = asset.surface, np.zeros((0, 3))
+    with tempfile.TemporaryDirectory() as folder:
+        given, result = Path(folder) / "meshes.npz", Path(folder) / "result.npz"
+        np.savez(
+            given,
+            vertices=surface.vertices,
+            faces=surface.faces,
+            corner_uv=atlas.corner_uv,
+            corner_normals=atlas.normals[atlas.faces],
+            high_vertices=none if high is None else high.surface.vertices,
+            high_faces=none if high is None else high.surface.faces,
+            kind="AO" if high is None else "NORMAL",
+            size=size,
+            samples=samples,
+            reach=reach,
+        )
+        command = [python, str(ROOT / "benchmarks" / "blender_bake.py"), str(given), str(result)]
+        subprocess.run(command, check=True, capture_output=True)
+        with np.load(result, allow_pickle=False) as found:
+            return found["image"], float(found["seconds"])
 
 
 def band_of(gbuffer: GBuffer, first: int, last: int) -> GBuffer:
@@ -133,7 +163,7 @@ def band_of(gbuffer: GBuffer, first: int, last: int) -> GBuffer:
     return replace(gbuffer, **parts, row=gbuffer.row + first, size=gbuffer.side)
 
 
-def high_rows(atlas: Atlas, low: Asset, high: Asset, size: int, cage: float) -> Iterator[Row]:
+def high_rows(atlas: Atlas, low: Asset, high: Asset, size: int, cage: float, blender: str | None) -> Iterator[Row]:
     """Seconds from meshes in memory to the PNG file, and what cameras see."""
     work = f"normals {len(high.faces)} → {len(low.faces)} faces, {size}²"
     start = time.perf_counter()
@@ -144,6 +174,11 @@ def high_rows(atlas: Atlas, low: Asset, high: Asset, size: int, cage: float) -> 
     seconds = time.perf_counter() - start
     plain, mapped = seen_errors(atlas, low, high, texture.pixels)
     yield Row(work, "low-poly alone", mean=float(plain.mean()), median=float(np.median(plain)))
+    if blender:
+        reach = cage * float(np.linalg.norm(np.ptp(low.surface.vertices, axis=0)))
+        image, theirs = by_blender(blender, atlas, low, high, size=size, samples=1, reach=reach)
+        _, seen_there = seen_errors(atlas, low, high, image * 2 - 1)
+        yield Row(work, "Blender, Cycles", theirs, mean=float(seen_there.mean()), median=float(np.median(seen_there)))
     met = seconds <= SECONDS_BAR and mapped.mean() <= ANGLE_BAR
     bar = f"≤ {SECONDS_BAR} s, ≤ {ANGLE_BAR}°: {'met' if met else 'missed'}"
     missed = source.report()["missed_share"]
@@ -236,6 +271,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--cage", type=float, default=0.02, help="part of the bounding box diagonal")
     parser.add_argument("--high", type=Path, help="the mesh, unwrapped before (glb); else flexpara unwraps it")
     parser.add_argument("--low", type=Path, help="a low-poly mesh with uv (glb); else the mesh is decimated, unwrapped")
+    parser.add_argument("--blender-python", help="a Python that has bpy: Blender's rows are added")
     return parser.parse_args(argv)
 
 
@@ -250,8 +286,8 @@ def main(argv: list[str] | None = None) -> int:
         folder, source = Path(name), load_asset(given.mesh)
         full = load_asset(given.high) if given.high else unwrapped(given.mesh, folder, given.size)
         low = load_asset(given.low) if given.low else decimated(source.surface, given.faces, folder, given.size)
-        rows = occlusion_rows(atlas_from_uv(full), full, given.size, given.rays)
-        more = high_rows(atlas_from_uv(low), low, source, given.size, given.cage)
+        rows = occlusion_rows(atlas_from_uv(full), full, given.size, given.rays, given.blender_python)
+        more = high_rows(atlas_from_uv(low), low, source, given.size, given.cage, given.blender_python)
         for table in (rows, more):
             for row in table:
                 print(row.line(), flush=True)
