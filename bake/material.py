@@ -34,6 +34,13 @@ DECODING: dict[Slot, Decoding] = {
     "metallic-roughness": "data",
     "occlusion": "data",
 }
+CHANNELS: dict[Slot, tuple[int, ...]] = {
+    "base-color": (0, 1, 2, 3),
+    "emissive": (0, 1, 2),
+    "normal": (0, 1, 2),
+    "metallic-roughness": (1, 2),
+    "occlusion": (0,),
+}
 DEFAULT_FINISH = (0.0, 0.8)
 """Metallic and roughness of a material that says nothing about them: a matt surface that is no metal."""
 
@@ -54,7 +61,7 @@ class SourceSlot:
         self.old_uv = old
         axes = texel_axes(atlas.corner_uv, old, size)
         self.samplers = [
-            None if picture is None else FootprintSampler(SourceTexture(picture, DECODING[slot]), axes)
+            None if picture is None else FootprintSampler(SourceTexture(picture, DECODING[slot], CHANNELS[slot]), axes)
             for picture in pictures
         ]
         for index, sampler in enumerate(self.samplers):
