@@ -119,7 +119,7 @@ class WrapParitySpec:
     sizes: tuple[int, ...] = (1, 2, 1000)
     """Numbers of rows n; 1 finds a frozen axis, 2 a squeezed one."""
     points_atol: float = 1e-4
-    """Largest |Δpoints| as a share of the frame's scale, a tenth of what the networks themselves miss the surface by.
+    """Largest |Δpoints| as a share of the frame's scale, a fifth of what the networks miss the surface by at best.
 
     What float32 loses at the frame's centre comes on top: WrapSession does not."""
     normals_atol: float = 1e-3

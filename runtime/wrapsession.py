@@ -93,9 +93,8 @@ class WrapSession:
         """Surface points and normals.
 
         Args:
-            uv: (n, 2) float32 or float64 in [0, 1], v up, inside the chart; n = 0 is allowed.  In the gutter beside a
-                chart the surface is continued smoothly, further out the answer means nothing but stays in the frame's
-                box.
+            uv: (n, 2) float32 or float64 in [0, 1], v up, inside the chart; n = 0 is allowed.  Outside the chart the
+                networks extrapolate: the answer stays in the frame's box, and means less the further out.
             chart: (n,) integers in [0, chart_count).
 
         Raises:

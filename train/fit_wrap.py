@@ -5,7 +5,7 @@ n samples · p patches · k charts · w waves.  uv: chart coordinates (any unit)
 Inside a chart uv is injective, so the inverse needs no search: an Assign-Net of the chart picks the patch, and the
 Wrap-Net of that patch answers.  Both are networks of one hidden layer of sines with random frequencies (Rahimi & Recht
 2007, "Random Features for Large-Scale Kernel Machines"), whose last layer is solved for exactly by ridge regression:
-no descent, a second in all, and closer than a deeper network trained for that long.
+no descent, one to two seconds of one core in all.
 """
 
 from __future__ import annotations
@@ -32,7 +32,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WrapConfig:
-    """Fitting the inverse.  Figures chosen on eight meshes: twice the waves halve the error at three times the cost."""
+    """Fitting the inverse.
+
+    Chosen on bunny and suzanne, where twice the waves (256 → 512) cut the error by a half and a quarter at twice to
+    three times the cost; checked on eight meshes: rms 0.05 to 0.15 % of the radius.
+    """
 
     samples: int = 60000
     """Surface samples, shared evenly by the patches."""
