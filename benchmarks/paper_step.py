@@ -164,7 +164,7 @@ def literal_chart_step(samples: PaperInput, points: Tensor, config: PaperConfig)
 def our_step(samples: PaperInput, config: PaperConfig) -> Callable[[], None]:
     """One step as train_paper takes it."""
     device = choose_device(config)
-    source, run = BatchSource(samples, config, device), Run.begin(config, device)
+    source, run = BatchSource(samples, config, device), Run.begin(config, samples, device)
     networks = run.networks
 
     def step() -> None:

@@ -13,13 +13,15 @@ from typing import Any, Literal
 from ...runtime.errors import InputError
 
 Mode = Literal["global", "multi-chart"]
+PAPER_HIDDEN = 512
+"""Channels of the paper's hidden layers, which the rates are meant for."""
 
 
 @dataclass(frozen=True)
 class PaperNets:
     """Sizes of the networks."""
 
-    hidden: int = 512
+    hidden: int = PAPER_HIDDEN
     """Channels of hidden layers (paper); 64 to 128 does for tests on a CPU."""
     embedding: int = 64
     """h: channels of the latent code inside Deform-, Wrap- and Cut-Net (paper)."""
@@ -95,9 +97,17 @@ class PaperConfig:
     rate: float = 1e-3
     """Initial learning rate of AdamW at 512 channels (decided: as Flatten Anything, which the paper extends)."""
     final_rate: float = 1e-5
-    """The same at the end of the half cosine (decided: likewise).  Networks of h channels take 512/h times both
-    (decided: the rule of μP, Yang & Hu 2021), so that narrow ones learn as fast; at 96 channels and 800 steps the
-    rate for 512 leaves a trefoil folded."""
+    """The same at the end of the half cosine (decided: likewise).
+
+    Global networks of h channels take 512/h times both (decided: the rule of μP, Yang & Hu 2021), so that narrow ones
+    learn as fast.  In the multi-chart mode that lets one chart win before the others have learned anything, and no
+    factor at all is slow, so there it is the root of 512/h.
+    """
+    score_spread: float = 4.0
+    """Multi-chart: standard deviation of each chart's logit over the points at the start, its mean being 0 (decided).
+
+    With nearly equal scores all charts learn the same map of the whole surface, and one or two win.
+    """
     decay: float = 1e-8
     """Weight decay (decided: likewise)."""
     neighbours: int = 8
@@ -121,6 +131,11 @@ class PaperConfig:
     chart_weights: MultiChartWeights = field(default_factory=MultiChartWeights)
     ablation: Ablation = field(default_factory=Ablation)
 
+    @property
+    def rate_factor(self) -> float:
+        """What both rates are multiplied with, see final_rate."""
+        return (PAPER_HIDDEN / self.nets.hidden) ** (1.0 if self.mode == "global" else 0.5)
+
     def __post_init__(self) -> None:
         """Refuse values that can't work.
 
@@ -138,7 +153,7 @@ class PaperConfig:
             _within(name, getattr(self, name), 1, 1000)
         _within("nets.hidden", self.nets.hidden, 1, 8192)
         _within("nets.embedding", self.nets.embedding, 1, 8192)
-        for name in ("rate", "final_rate", "decay", "epsilon", "cut_share"):
+        for name in ("rate", "final_rate", "decay", "epsilon", "cut_share", "score_spread"):
             _finite(name, getattr(self, name))
         for owner in ("nets", "global_weights", "chart_weights"):
             for name, value in asdict(getattr(self, owner)).items():

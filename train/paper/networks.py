@@ -207,6 +207,14 @@ class MultiChartPaperNetworks(nn.Module):
         feature = leaky_relu(self.embedding(xyz), self.slope)
         return self.assign(feature), self.unwrap(feature).transpose(0, 1)
 
+    @torch.no_grad()
+    def spread_scores(self, xyz: Tensor, deviation: float) -> None:
+        """Scale and shift the last layer of the Assign-Net: logits of mean 0 and this deviation over xyz (n, 3)."""
+        logits, last = self(xyz)[0], self.assign._affine()[-1]
+        scale = deviation / logits.std(dim=0).clamp(min=torch.finfo(logits.dtype).eps)
+        last.weight.mul_(scale)
+        last.bias.copy_((last.bias - logits.mean(dim=0)) * scale)
+
     def flatten(self, xyz: Tensor, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor]:
         """Logits (n, p) and uv (p, n, 2) of points (n, 3), or (p, n, 3) with points of its own for each chart."""
         feature = leaky_relu(self.embedding.run(xyz, dtype, features=True), self.slope)

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 BETAS = (0.9, 0.999)
 EPSILON = 1e-8
-PAPER_HIDDEN = 512
-"""Channels that ``PaperConfig.rate`` is meant for."""
 
 
 def cosine_rate(step: int, steps: int, first: float, last: float) -> float:
@@ -45,7 +43,7 @@ class CosineAdamW:
         """One step down the gradient of a scalar loss; parameters it doesn't depend on only decay."""
         gradients = torch.autograd.grad(loss, self._parameters, materialize_grads=True)
         config = self._config
-        rate = cosine_rate(self.taken, config.steps, config.rate, config.final_rate) * PAPER_HIDDEN / config.nets.hidden
+        rate = cosine_rate(self.taken, config.steps, config.rate, config.final_rate) * config.rate_factor
         self.taken += 1
         first, second = (1.0 - beta**self.taken for beta in BETAS)
         with torch.no_grad():

@@ -60,10 +60,13 @@ class Run:
     generator: torch.Generator
 
     @classmethod
-    def begin(cls, config: PaperConfig, device: torch.device) -> Run:
+    def begin(cls, config: PaperConfig, samples: PaperInput, device: torch.device) -> Run:
         """A fresh run."""
         generator = torch.Generator().manual_seed(config.seed)
-        networks = make_networks(config, generator).to(device)
+        networks = make_networks(config, generator)
+        if isinstance(networks, MultiChartPaperNetworks):
+            networks.spread_scores(torch.from_numpy(samples.points).float(), config.score_spread)
+        networks = networks.to(device)
         return cls(networks, CosineAdamW(networks, config), generator)
 
     def state(self) -> State:
@@ -112,7 +115,7 @@ def train_paper(
         FlexparaError: training diverged.
     """
     device = choose_device(config)
-    source, run = BatchSource(samples, config, device), Run.begin(config, device)
+    source, run = BatchSource(samples, config, device), Run.begin(config, samples, device)
     sha = samples.sha256() if checkpoints is not None else ""
     if checkpoints is not None and (state := checkpoints.latest(config, sha)) is not None:
         run.restore(state)

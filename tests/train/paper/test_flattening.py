@@ -71,3 +71,20 @@ def test_a_simple_surface_is_flattened_and_cut_only_where_it_is_closed(name: str
     assert result.flipped < 0.02
     assert bool(result.cut.any()) is closed
     assert result.cut.mean() < 0.05
+
+
+def test_charts_share_a_torus_with_little_stretch() -> None:
+    config = PaperConfig(mode="multi-chart", charts=6, steps=400, points=300, nets=PaperNets(hidden=64), device="cpu")
+    surface = sample("torus", 48)
+    networks = train_paper(as_input(surface), config, lambda step, loss: None)
+    with torch.no_grad():
+        logits, every = networks(torch.from_numpy(surface.vertices).float())
+    chart = logits.argmax(dim=1).numpy()
+    assert 3 <= len(set(chart.tolist())) <= 6
+    whole = surface.faces[(chart[surface.faces] == chart[surface.faces[:, :1]]).all(axis=1)]
+    uv, xyz = every.numpy()[whole, chart[whole]], surface.vertices[whole]
+    flat, solid = (np.linalg.norm(side - np.roll(side, -1, axis=1), axis=-1) for side in (uv, xyz))
+    stretch = float(np.abs(flat / solid - 1.0).mean())
+    assert stretch < 0.06
+    score = torch.softmax(logits, dim=1).amax(dim=1)
+    assert score.mean() > 0.9

@@ -108,6 +108,17 @@ def test_each_chart_is_a_network_of_its_own() -> None:
     assert changed.tolist() == [False, True, False]
 
 
+def test_spread_scores_have_the_deviation_asked_for() -> None:
+    networks = MultiChartPaperNetworks(3, SMALL, generator=generator()).double()
+    xyz = noise(50, 3)
+    uv = networks(xyz)[1]
+    networks.spread_scores(xyz, 4.0)
+    logits, still = networks(xyz)
+    torch.testing.assert_close(logits.mean(dim=0), torch.zeros(3).double(), rtol=0.0, atol=1e-9)
+    torch.testing.assert_close(logits.std(dim=0), torch.full((3,), 4.0).double())
+    assert torch.equal(uv, still)
+
+
 def test_jets_of_the_wrap_net_equal_reverse_mode_in_value_and_gradient() -> None:
     networks = GlobalNetworks(SMALL, generator=generator()).double()
     uv = noise(9, 2)

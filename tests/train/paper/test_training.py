@@ -118,7 +118,9 @@ def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
 
 
 def test_tensors_of_other_networks_are_refused() -> None:
-    run, other = Run.begin(SMALL, CPU), Run.begin(replace(SMALL, nets=PaperNets(hidden=8)), CPU)
+    run, other = (
+        Run.begin(each, surface_input("tube", 16), CPU) for each in (SMALL, replace(SMALL, nets=PaperNets(hidden=8)))
+    )
     with pytest.raises(InputError, match="differ"):
         run.restore(other.state())
 
@@ -155,7 +157,8 @@ def test_a_device_that_is_absent_is_named(monkeypatch: pytest.MonkeyPatch) -> No
 )
 def test_each_global_ablation_leaves_its_terms_out(ablation: Ablation, names: set[str]) -> None:
     config = replace(SMALL, ablation=ablation)
-    run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
+    samples = surface_input("tube", 16)
+    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
     terms = global_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
@@ -172,7 +175,8 @@ def test_each_global_ablation_leaves_its_terms_out(ablation: Ablation, names: se
 )
 def test_each_multi_chart_ablation_adds_its_terms(ablation: Ablation, names: set[str]) -> None:
     config = replace(SMALL, mode="multi-chart", ablation=ablation)
-    run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
+    samples = surface_input("tube", 16)
+    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, MultiChartPaperNetworks)
     terms = chart_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
@@ -182,7 +186,8 @@ def test_each_multi_chart_ablation_adds_its_terms(ablation: Ablation, names: set
 
 def test_weights_multiply_their_terms() -> None:
     config = replace(SMALL, global_weights=GlobalWeights(1.0, 10.0, 100.0, 1000.0, 10000.0))
-    run, source = Run.begin(config, CPU), BatchSource(surface_input("tube", 16), config, CPU)
+    samples = surface_input("tube", 16)
+    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
     batch = source.draw(run.generator)
     terms = global_terms(run.networks, batch, config)
@@ -200,7 +205,7 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
     mesh = surface_input("tube", 16)
     cloud = PaperInput(mesh.points, mesh.normals if oriented else None)
     trained = train_paper(cloud, config, silent)
-    run, source = Run.begin(config, CPU), BatchSource(cloud, config, CPU)
+    run, source = Run.begin(config, cloud, CPU), BatchSource(cloud, config, CPU)
     batch = source.draw(run.generator)
     assert (batch.triangles is None, batch.normal is None) == (True, not oriented)
     if isinstance(run.networks, GlobalNetworks):
