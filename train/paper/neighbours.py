@@ -11,8 +11,8 @@ from torch import Tensor
 
 from ...runtime.errors import FlexparaError
 
-BLOCK = 2048
-"""Queries whose distances to all points are held at a time on CUDA."""
+DISTANCES = 1 << 27
+"""Distances that are held at a time on CUDA (512 MiB)."""
 
 
 class Neighbourhood:
@@ -45,7 +45,8 @@ def own_neighbours(points: Tensor, count: int) -> Tensor:
 
 
 def _by_blocks(points: Tensor, queries: Tensor, count: int) -> Tensor:
-    found = [torch.cdist(block, points).topk(count, largest=False).indices for block in queries.split(BLOCK)]
+    size = max(1, DISTANCES // len(points))
+    found = [torch.cdist(block, points).topk(count, largest=False).indices for block in queries.split(size)]
     return torch.cat(found)
 
 

@@ -1,7 +1,8 @@
 """Training of preset ``paper``: input and config in, networks out; killed and resumed as if unbroken.
 
-Every step: draw a batch, one mode's loss, AdamW.  All chance comes from one generator on the CPU, so a run repeats bit
-for bit on the same machine and number of threads.
+Every step: draw a batch, one mode's loss, AdamW.  All chance comes from one generator on the CPU, so on a CPU a run
+repeats bit for bit on the same machine and number of threads.  On CUDA gradients of gathered points are summed in any
+order, so there it repeats to rounding only.
 """
 
 from __future__ import annotations
