@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from .meshfile import load_asset
     from .metrics import measure
     from .session import UnwrapSession
+    from .wrapsession import WrapSession
 
-__all__ = ["Asset", "Atlas", "Charts", "Frame", "Surface", "UnwrapSession", "load_asset", "measure"]
+__all__ = ["Asset", "Atlas", "Charts", "Frame", "Surface", "UnwrapSession", "WrapSession", "load_asset", "measure"]
 
 _HOME = dict.fromkeys(("Asset", "Atlas", "Charts", "Frame", "Surface"), "mesh") | {
     "UnwrapSession": "session",
+    "WrapSession": "wrapsession",
     "load_asset": "meshfile",
     "measure": "metrics",
 }

@@ -11,7 +11,6 @@ no descent, one to two seconds of one core in all.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from torch import Tensor, nn
 from ..runtime.errors import InputError
 from ..runtime.mesh import Surface
 from ..runtime.wrapagreement import corner_normals, interpolated_normals
+from .config import WrapConfig
 from .sampling import sample_surface
 
 if TYPE_CHECKING:
@@ -28,30 +28,6 @@ if TYPE_CHECKING:
 
     from ..runtime.mesh import Charts
     from .pipeline import Progress
-
-
-@dataclass(frozen=True)
-class WrapConfig:
-    """Fitting the inverse.
-
-    Chosen on bunny and suzanne, where twice the waves (256 → 512) cut the error by a half and a quarter at twice to
-    three times the cost; checked on eight meshes: rms 0.05 to 0.15 % of the radius.
-    """
-
-    samples: int = 60000
-    """Surface samples, shared evenly by the patches."""
-    fewest: int = 600
-    """Samples that a patch gets at least."""
-    waves: int = 384
-    """Sines of a Wrap-Net."""
-    assign_waves: int = 256
-    """Sines of an Assign-Net."""
-    band: float = 0.7
-    """Highest frequency, as a share of the one at which a patch of that area has as many modes as the net has sines."""
-    ridge: float = 1e-6
-    """Ridge, as a share of the mean square of a hidden unit over the samples."""
-    shared: float = 0.25
-    """A patch also learns from its neighbours' samples where the Assign-Net gives it at least this score of about 1."""
 
 
 class SineNets(nn.Module):

@@ -21,7 +21,8 @@ from flexpara.export.wrapgraph import WrapGraph, WrapParitySpec, fold_placement,
 from flexpara.runtime.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.errors import FlexparaError, InputError, MissingFileError, ParityError, ShapeError
 from flexpara.runtime.wrapsession import WrapSession
-from flexpara.train.fit_wrap import AtlasWrap, WrapConfig
+from flexpara.train.config import WrapConfig
+from flexpara.train.fit_wrap import AtlasWrap
 from flexpara.train.paper.config import PaperNets
 from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
 

@@ -12,10 +12,10 @@ from torch import Tensor
 
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Charts, Surface
+from flexpara.train.config import WrapConfig
 from flexpara.train.fit_wrap import (
     AtlasWrap,
     SineNets,
-    WrapConfig,
     draw_waves,
     fit_wrap,
     patch_table,
