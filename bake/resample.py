@@ -4,11 +4,10 @@ t texels · f faces · h w source texels.  Both atlases lie on the same faces, s
 face and place, the old uv follow.  uv are v up, row 0 of a picture is its top.
 
 A new texel is a parallelogram in the old picture, the same for all texels of a face.  It is averaged over a grid of up
-to `MOST` × `MOST` points with spacing of at most one texel, two to four along its shorter side, of a smaller picture
-where it is larger than that; where
-the new texel is the smaller one, it takes the bilinear value at its centre less up to `SHARPEN` times the second
-differences to its four neighbours: a reader's bilinear filter blurs by about as much.  Colours are averaged in linear
-light, normals as vectors.
+to `MOST` × `MOST` points, two to four along its shorter side, with spacing of about one texel of a picture that is
+halved as often as that needs.  Where the new texel is the smaller one, it takes the bilinear value at its centre less
+up to `SHARPEN` times the second differences to its four neighbours: a reader's bilinear filter blurs by about as much.
+Colours are averaged in linear light, normals as vectors.
 """
 
 from __future__ import annotations

@@ -20,6 +20,8 @@ from flexpara.bake.tangents import (
     vertex_tangents,
 )
 from flexpara.runtime.mesh import Asset, Atlas
+from flexpara.runtime.meshfile import load_asset
+from flexpara.runtime.packing import atlas_from_uv
 
 Pair = tuple[Atlas, Asset]
 
@@ -83,6 +85,15 @@ def test_split_vertices_are_one_point_without_a_seam_for_mikktspace(sphere: Pair
     )
     expected = reference_tangents(loose, tmp_path)
     assert_same_tangents(vertex_tangents(loose)[loose.faces], expected)
+
+
+def test_they_are_those_of_mikktspace_on_a_real_mesh(models: Path, tmp_path: Path) -> None:
+    atlas = split_by_tangents(atlas_from_uv(load_asset(models / "spot.obj")))
+    expected = reference_tangents(atlas, tmp_path)
+    found = vertex_tangents(atlas)[atlas.faces]
+    np.testing.assert_array_equal(found[..., 3], expected[..., 3])
+    agree = np.einsum("fci,fci->fc", found[..., :3], expected[..., :3])
+    assert agree.min() > 1.0 - 1e-5
 
 
 def test_an_atlas_of_one_orientation_is_not_split(sphere: Pair) -> None:
