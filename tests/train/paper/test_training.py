@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -213,6 +215,31 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
     logits, uv = trained(torch.from_numpy(cloud.points).float())
     assert torch.isfinite(logits).all()
     assert torch.isfinite(uv).all()
+
+
+def test_compiled_parts_are_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch, "compile", lambda function, dynamic: lambda *inputs: function(*inputs) + 1.0)
+    networks, xyz = Run.begin(SMALL, surface_input("tube", 16), CPU).networks, torch.zeros(2, 3)
+    assert isinstance(networks, GlobalNetworks)
+    plain = networks.flatten(xyz)
+    training.compile_parts(networks)
+    torch.testing.assert_close(networks.flatten(xyz), plain + 1.0)
+    training.plain_parts(networks)
+    assert torch.equal(networks.flatten(xyz), plain)
+
+
+def test_training_on_the_cpu_imports_no_compiler() -> None:
+    code = """
+import sys
+import numpy as np
+from flexpara.train.paper.batches import PaperInput
+from flexpara.train.paper.config import PaperConfig, PaperNets
+from flexpara.train.paper.training import train_paper
+config = PaperConfig(steps=2, nets=PaperNets(hidden=8), device="cpu")
+train_paper(PaperInput(np.random.default_rng(0).normal(size=(40, 3))), config, lambda step, loss: None)
+assert "torch._dynamo" not in sys.modules and "torch._inductor" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_bfloat16_trains_too(config: PaperConfig) -> None:
