@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import MissingDependencyError
+from ..runtime.errors import FlexparaError, MissingDependencyError
 
 try:
     import moderngl
@@ -94,6 +94,15 @@ def max_texture_size(context: moderngl.Context) -> int:
     """Largest side in texels of a texture that can also be drawn into."""
     viewport = context.info["GL_MAX_VIEWPORT_DIMS"]
     return min(int(context.info["GL_MAX_TEXTURE_SIZE"]), *(int(side) for side in viewport))
+
+
+def check_error(context: moderngl.Context) -> None:
+    """Raise FlexparaError when OpenGL has an error to report: what was drawn is then not to be trusted."""
+    error = context.error
+    if error != "GL_NO_ERROR":
+        raise FlexparaError(
+            f"OpenGL reports {error}, expected none; bake smaller or fewer maps, or without OpenGL (device software)"
+        )
 
 
 def is_hardware(context: moderngl.Context) -> bool:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..runtime.errors import InputError
-from .context import drawing_into, max_texture_size, moderngl
+from .context import check_error, drawing_into, max_texture_size, moderngl
 from .layout import Layout, Planes, Window, windows
 from .shaders import build_program
 
@@ -180,7 +180,7 @@ class DeviceRasterizer:
     def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
         """The G-buffer of a window, read into planes of its shape where given: they are then used, not copied.
 
-        Raises: InputError for a window beyond the capacity.
+        Raises: InputError for a window beyond the capacity; FlexparaError when OpenGL reports an error.
         """
         if window.height > self._height or window.width > self._width:
             raise InputError(
@@ -198,6 +198,7 @@ class DeviceRasterizer:
                 self._context.enable_only(moderngl.NOTHING)
                 for attachment, plane in enumerate(into):
                     _read(frame, attachment, plane)
+        check_error(self._context)
         return GBuffer.of(into, window.row, window.column, self.layout.size)
 
     def _draw_faces(self, stack: ExitStack, window: Window) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import moderngl
 import pytest
 
 from flexpara.bake import context as module
-from flexpara.runtime.errors import MissingDependencyError
+from flexpara.runtime.errors import FlexparaError, MissingDependencyError
 
 
 class FakeContext:
@@ -93,6 +94,13 @@ def test_a_leak_would_be_seen(leaks: Callable[[moderngl.Context], list[str]]) ->
         del texture
         assert leaks(context) == ["Texture"]
         context.objects.pop().release()
+
+
+def test_an_error_of_opengl_is_not_passed_over(context: moderngl.Context) -> None:
+    module.check_error(context)
+    failing: Any = SimpleNamespace(error="GL_OUT_OF_MEMORY")
+    with pytest.raises(FlexparaError, match=r"GL_OUT_OF_MEMORY, expected none; .*device software"):
+        module.check_error(failing)
 
 
 def test_drawing_again_after_a_release_is_no_error(context: moderngl.Context) -> None:
