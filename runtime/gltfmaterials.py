@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from .gltfbuffers import GltfFile, buffer_view, read_resource
-from .materials import SLOTS, UNTURNED, PbrMaterial, Picture, decode_image
+from .materials import SLOTS, UNTURNED, PbrMaterial, Picture, decode_image, finite
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,7 +79,7 @@ def _material(
             pictures[slot] = _picture(file, info, pixels)
     surface = entry.get("pbrMetallicRoughness", {})
     red, green, blue, alpha = (_unit(value) for value in surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
-    strength = max(float(entry.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0)), 0.0)
+    strength = max(finite(entry.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0)), 0.0)
     glow = tuple(_unit(value) * strength for value in entry.get("emissiveFactor", (0.0, 0.0, 0.0)))
     mode = entry.get("alphaMode", "OPAQUE")
     return PbrMaterial(
@@ -89,18 +89,18 @@ def _material(
         pictures=pictures,
         metallic=_unit(surface.get("metallicFactor", 1.0)),
         roughness=_unit(surface.get("roughnessFactor", 1.0)),
-        normal_scale=float(infos.get("normal", {}).get("scale", 1.0)),
+        normal_scale=finite(infos.get("normal", {}).get("scale", 1.0)),
         occlusion_strength=_unit(infos.get("occlusion", {}).get("strength", 1.0)),
         emissive=(glow[0], glow[1], glow[2]),
         alpha_mode=ALPHA_MODES[ALPHA_MODES.index(mode)],
-        alpha_cutoff=max(float(entry.get("alphaCutoff", 0.5)), 0.0),
+        alpha_cutoff=max(finite(entry.get("alphaCutoff", 0.5)), 0.0),
         double_sided=bool(entry.get("doubleSided", False)),
     )
 
 
 def _unit(value: Any) -> float:
     """A number of the file, limited to [0, 1]."""
-    return min(max(float(value), 0.0), 1.0)
+    return min(max(finite(value), 0.0), 1.0)
 
 
 def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | None:
@@ -138,9 +138,9 @@ def _placement(
     """
     if not transform:
         return UNTURNED
-    shift_u, shift_v = (float(value) for value in transform.get("offset", (0.0, 0.0)))
-    scale_u, scale_v = (float(value) for value in transform.get("scale", (1.0, 1.0)))
-    angle = float(transform.get("rotation", 0.0))
+    shift_u, shift_v = (finite(value) for value in transform.get("offset", (0.0, 0.0)))
+    scale_u, scale_v = (finite(value) for value in transform.get("scale", (1.0, 1.0)))
+    angle = finite(transform.get("rotation", 0.0))
     cos, sin = math.cos(angle), math.sin(angle)
     across = (cos * scale_u, sin * scale_v)
     down = (-sin * scale_u, cos * scale_v)

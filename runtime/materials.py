@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING, Literal
 
@@ -33,6 +34,7 @@ Wrap = Literal["repeat", "mirror", "clamp"]
 Slot = Literal["base-color", "metallic-roughness", "normal", "emissive", "occlusion"]
 AlphaMode = Literal["OPAQUE", "MASK", "BLEND"]
 SLOTS: tuple[Slot, ...] = ("base-color", "metallic-roughness", "normal", "emissive", "occlusion")
+MTL_SLOTS: dict[str, Slot] = {"map_kd": "base-color", "map_ke": "emissive", "norm": "normal"}
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
@@ -146,8 +148,9 @@ def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
 
 
 def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[dict[str, Material], int]:
-    """OBJ material library → materials by name (Kd, d and map_Kd), and how many textures were not found.
+    """OBJ material library → materials by name, and how many textures were not found.
 
+    Read are Kd, d, map_Kd, and of the physically based additions Pm, Pr, Ke, map_Ke and norm; of options -clamp on.
     Kd is a linear factor; beside a texture it is ignored, as exporters leave their default grey there.
 
     Raises: MeshError for a texture that is no picture.
@@ -160,15 +163,64 @@ def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[
             current = raw.setdefault(rest.strip(), {})
         else:
             current[key.lower()] = rest.strip()
-    materials, missing = {}, 0
+    materials: dict[str, Material] = {}
+    missing = 0
     for name, fields in raw.items():
-        picture = read_sibling(_map_name(fields["map_kd"])) if fields.get("map_kd") else None
-        missing += bool(fields.get("map_kd")) and picture is None
-        texture = None if picture is None else decode_image(picture)
-        materials[name] = Material(
-            name=name, base_color_factor=_factor(fields, texture is not None), base_color=texture
-        )
+        pictures: dict[Slot, Picture] = {}
+        for key, slot in MTL_SLOTS.items():
+            picture = read_sibling(_map_name(fields[key])) if fields.get(key) else None
+            missing += bool(fields.get(key)) and picture is None
+            if picture is not None:
+                pictures[slot] = Picture(decode_image(picture), _mtl_wrap(fields[key]))
+        materials[name] = _mtl_material(name, fields, pictures)
     return materials, missing
+
+
+def _mtl_material(name: str, fields: Mapping[str, str], pictures: Mapping[Slot, Picture]) -> Material:
+    """A plain Material where the library says no more than a colour, repeated."""
+    base = pictures.get("base-color")
+    factor, pixels = _factor(fields, base is not None), None if base is None else base.pixels
+    simple = set(pictures) <= {"base-color"} and not {"ke", "pm", "pr"} & set(fields)
+    if simple and (base is None or base.wrap == ("repeat", "repeat")):
+        return Material(name=name, base_color_factor=factor, base_color=pixels)
+    clear = factor[3] < 1.0 or (pixels is not None and int(pixels[..., 3].min()) < 255)
+    red, green, blue = _numbers(fields.get("ke", "1 1 1" if "emissive" in pictures else "0 0 0"))
+    return PbrMaterial(
+        name=name,
+        base_color_factor=factor,
+        base_color=pixels,
+        pictures=pictures,
+        metallic=_numbers(fields.get("pm", "0"))[0],
+        roughness=_numbers(fields.get("pr", "0.8"))[0],
+        emissive=(red, green, blue),
+        alpha_mode="BLEND" if clear else "OPAQUE",
+    )
+
+
+def _mtl_wrap(text: str) -> tuple[Wrap, Wrap]:
+    """Clamped where the options say "-clamp on", else repeated."""
+    words = text.lower().split()
+    clamped = any(pair == ("-clamp", "on") for pair in pairwise(words))
+    return ("clamp", "clamp") if clamped else ("repeat", "repeat")
+
+
+def finite(value: object) -> float:
+    """The value as a float.  Raises: ValueError for NaN, infinity, or what is no number."""
+    number = float(str(value))
+    if not np.isfinite(number):
+        raise ValueError(f"{number} is not finite")
+    return number
+
+
+def _numbers(text: str) -> list[float]:
+    """Three numbers in [0, 1]; a single one stands for all.  Raises: MeshError for what is no number."""
+    try:
+        found = [min(max(finite(word), 0.0), 1.0) for word in text.split()]
+    except ValueError as error:
+        raise MeshError(
+            f"a material has factors that are no numbers ({error}); mend or delete the .mtl file"
+        ) from error
+    return (found * 3)[:3] if len(found) == 1 else [*found, 0.0, 0.0, 0.0][:3]
 
 
 def _map_name(text: str) -> str:
@@ -176,7 +228,7 @@ def _map_name(text: str) -> str:
     return text.split()[-1] if text.startswith("-") else text
 
 
-def _factor(fields: dict[str, str], textured: bool) -> tuple[float, float, float, float]:
+def _factor(fields: Mapping[str, str], textured: bool) -> tuple[float, float, float, float]:
     try:
         kd = [min(max(float(word), 0.0), 1.0) for word in fields.get("kd", "1 1 1").split()]
         alpha = min(max(float(fields.get("d", "1").split()[-1]), 0.0), 1.0)

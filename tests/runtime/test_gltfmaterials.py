@@ -115,9 +115,13 @@ def test_a_texture_transform_moves_uv(transform: dict[str, Any], uv: Any, expect
     np.testing.assert_allclose((a * u + b * v + c, 1 - (d * u + e * v + f)), expected, atol=1e-12)
 
 
-def test_broken_materials_are_bad_input(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "entry",
+    ['"alphaMode": "GLASS"', '"alphaCutoff": NaN', '"emissiveFactor": [1, 2]', '"normalTexture": {"index": 7}'],
+)
+def test_broken_materials_are_bad_input(tmp_path: Path, entry: str) -> None:
     path = tmp_path / "bad.gltf"
-    path.write_text('{"asset": {"version": "2.0"}, "materials": [{"alphaMode": "GLASS"}]}')
+    path.write_text(f'{{"asset": {{"version": "2.0"}}, "materials": [{{{entry}}}]}}')
     with pytest.raises(MeshError, match="damaged"):
         load_asset(path)
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.materials import decode_image, linear_to_srgb, read_in_folder, read_mtl
+from flexpara.runtime.materials import PbrMaterial, decode_image, linear_to_srgb, read_in_folder, read_mtl
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -65,3 +65,24 @@ def test_the_srgb_curve_has_its_known_points_and_no_jump() -> None:
     np.testing.assert_allclose(linear_to_srgb(np.array([0.0, 1.0, 0.5])), [0.0, 1.0, 0.735356983052], atol=1e-12)
     knee = linear_to_srgb(np.array([0.0031308 - 1e-9, 0.0031308 + 1e-9]))
     assert abs(np.diff(knee)[0]) < 1e-6
+
+
+def test_physically_based_lines_and_clamping_are_read() -> None:
+    stream = io.BytesIO()
+    Image.new("RGBA", (2, 2), (9, 8, 7, 128)).save(stream, "PNG")
+    text = b"newmtl a\nmap_Kd -clamp on a.png\nnorm n.png\nmap_Ke gone.png\nKe 0.5\nPm 1\nPr 0.25\n"
+    materials, missing = read_mtl(text, lambda name: None if name == "gone.png" else stream.getvalue())
+    material = materials["a"]
+    assert isinstance(material, PbrMaterial)
+    assert missing == 1
+    assert set(material.pictures) == {"base-color", "normal"}
+    assert material.pictures["base-color"].wrap == ("clamp", "clamp")
+    assert material.pictures["normal"].wrap == ("repeat", "repeat")
+    assert (material.metallic, material.roughness, material.emissive) == (1.0, 0.25, (0.5, 0.5, 0.5))
+    assert material.alpha_mode == "BLEND"
+
+
+@pytest.mark.parametrize("line", [b"Ke red", b"Pm nan", b"Pr inf"])
+def test_factors_that_are_no_numbers_are_refused(line: bytes) -> None:
+    with pytest.raises(MeshError, match="no numbers"):
+        read_mtl(b"newmtl a\n" + line + b"\n", lambda _: None)
