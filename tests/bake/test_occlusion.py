@@ -173,9 +173,9 @@ def test_a_ball_is_as_thick_as_its_radius() -> None:
     np.testing.assert_allclose(covered(buffer, thickness(buffer, *scene, RaySettings(1024))), 0.99, atol=0.01)
 
 
-@pytest.mark.parametrize("depth", [0.25, 1.0])
-def test_a_slab_is_as_thick_as_it_is(depth: float) -> None:
-    side = 50.0
+@pytest.mark.parametrize(("depth", "side"), [(0.25, 50.0), (1.0, 50.0), (1.0, 0.8)])
+def test_a_slab_is_as_thick_as_it_is(depth: float, side: float) -> None:
+    """Open at its sides: what leaves there does not count, so the small one is as thick as the wide ones."""
     top = [[-side, -side, 0], [side, -side, 0], [side, side, 0], [-side, side, 0]]
     bottom = [[x, y, -depth] for x, y, _ in reversed(top)]
     scene = scene_of(quads(top, bottom))
