@@ -47,8 +47,9 @@ class SoftwareRasterizer:
         self._positions, self._normals, self._faces = atlas.positions, atlas.normals, atlas.faces
         self._snapped = np.floor(self.layout.texel * np.float32(ONE) + np.float32(0.5)).astype(np.int64)
 
-    def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
-        """The G-buffer of a window, written into planes of its shape where given."""
+    def draw(self, window: Window, planes: Planes | None = None, *, clear: bool = True) -> GBuffer:
+        """The G-buffer of a window, written into planes of its shape where given; always clear."""
+        del clear
         into = Planes.of(window.height, window.width) if planes is None else planes
         into.position[...], into.normal[...], into.face[...] = 0.0, 0.0, -1
         face = np.full(window.height * window.width, -1, np.int32)

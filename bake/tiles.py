@@ -41,7 +41,7 @@ class SoftwareWarning(UserWarning):
 class Rasterizer(Protocol):
     """What draws windows: `DeviceRasterizer` or `SoftwareRasterizer`."""
 
-    def draw(self, window: Window, planes: Planes | None = None) -> GBuffer:
+    def draw(self, window: Window, planes: Planes | None = None, *, clear: bool = True) -> GBuffer:
         """The G-buffer of a window."""
         ...
 
@@ -129,7 +129,7 @@ def map_windows(
     planes = Planes.of(*plan.capacity(pieces))
     for number, window in enumerate(pieces):
         fine = window.scaled(plan.along)
-        gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width))
+        gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width), clear=False)  # the rest is background
         held = gbuffer.face >= 0
         covered = covered_texels(held, plan.along) if plan.along > 1 else held
         maps: dict[str, NDArray[np.float32]] = {}

@@ -72,6 +72,10 @@ def test_a_window_drawn_again_into_kept_planes_is_the_same(sphere: Pair, context
             np.testing.assert_array_equal(buffer.position, whole.position[window.rows, window.columns])
             np.testing.assert_array_equal(buffer.face, whole.face[window.rows, window.columns])
             assert (buffer.image_texels(np.array([0])) == window.row * 50 + window.column).all()
+            again = drawn.draw(window, clear=False)
+            covered = again.face >= 0
+            np.testing.assert_array_equal(again.face, buffer.face)
+            np.testing.assert_array_equal(again.position[covered], buffer.position[covered])
         with pytest.raises(InputError, match="window of 21"):
             drawn.draw(windows(50, 21, 1000)[0])
 
