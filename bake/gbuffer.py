@@ -135,8 +135,8 @@ def rasterize(
 ) -> GBuffer:
     """Draw the atlas into size × size texels.
 
-    limit: the largest side drawn at once, in texels; it changes no bit.  planes: arrays of that size to draw into again,
-    since new memory often takes longer than drawing.
+    limit: the largest side drawn at once, in texels; it changes no bit.  planes: arrays of that size to draw into
+    again, since new memory often takes longer than drawing.
     Raises: InputError for a size out of range, for uv outside [0, 1], for more faces than the device can hold.
     """
     layout = Layout.of(atlas, size)
