@@ -4,7 +4,7 @@ t texels · f faces · h w source texels.  Both atlases lie on the same faces, s
 face and place, the old uv follow.  uv are v up, row 0 of a picture is its top.
 
 A new texel is a parallelogram in the old picture, the same for all texels of a face.  It is averaged over a grid of up
-to `MOST` × `MOST` points, two to four along its shorter side, with spacing of about one texel of a picture that is
+to `MOST` × `MOST` points, one or two along its shorter side, with spacing of about one texel of a picture that is
 halved as often as that needs.  Where the new texel is the smaller one, it takes the bilinear value at its centre less
 up to `SHARPEN` times the second differences to its four neighbours: a reader's bilinear filter blurs by about as much.
 Colours are averaged in linear light, normals as vectors.
@@ -144,7 +144,7 @@ class FootprintSampler:
             chosen = np.flatnonzero(kind == key)
             faces = face[chosen]
             step, grid = self.steps[faces].transpose(1, 2, 0), self.counts[faces[0]]
-            if grid.max() == 1 and self.texture.picture.smooth:
+            if key == 0 and self.texture.picture.smooth:
                 result[:, chosen] = self._sharpened(u[chosen], v[chosen], step, self.gain[faces])
             else:
                 result[:, chosen] = self._averaged(u[chosen], v[chosen], step, grid, int(key) // 64)
@@ -202,7 +202,7 @@ def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: i
 def footprint_grids(axes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """How footprints (f, 2, 2), in source texels, are sampled: points per side (f, 2), powers of 2, and level (f,)."""
     length = np.linalg.norm(axes, axis=2)
-    coarse = np.maximum(np.floor(np.log2(np.maximum(length.min(axis=1), 1.0)) + 1e-9) - 1.0, 0.0)
+    coarse = np.floor(np.log2(np.maximum(length.min(axis=1), 1.0)) + 1e-9)
     length = length / np.exp2(coarse)[:, None]
     wanted = np.ceil(np.log2(np.maximum(length, 1.0)) - 1e-9)
     counts = np.exp2(np.minimum(wanted, np.log2(MOST))).astype(np.int64)

@@ -111,8 +111,8 @@ def test_axes_of_one_triangle_by_hand() -> None:
 def test_footprints_are_sampled_once_a_texel_of_the_picture_that_fits() -> None:
     axes = np.array([[[0.3, 0], [0, 0.9]], [[1.0, 0], [0, 3.0]], [[0, 8.0], [32.0, 0]]])
     counts, levels = footprint_grids(axes)
-    np.testing.assert_array_equal(counts, [[1, 1], [1, 4], [2, 8]])
-    np.testing.assert_array_equal(levels, [0, 0, 2])
+    np.testing.assert_array_equal(counts, [[1, 1], [1, 4], [1, 4]])
+    np.testing.assert_array_equal(levels, [0, 0, 3])
 
 
 @pytest.mark.parametrize("texels", [1, 2, 4, 8, 32])
