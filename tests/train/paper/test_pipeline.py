@@ -171,10 +171,15 @@ def test_hardly_trained_networks_still_give_valid_charts_in_source_units(mode: s
     vertices, faces = make_sample("torus", resolution=20)
     torus = Surface(10.0 * vertices + np.array([5.0, 0.0, 0.0]), faces)
     stages: list[str] = []
+
+    def note(stage: str, step: int, steps: int, loss: float | None = None) -> None:
+        del step, steps, loss
+        stages.append(stage)
+
     config = PaperConfig(
         mode="global" if mode == "global" else "multi-chart", charts=4, steps=20, points=64, nets=SMALL
     )
-    result = train_paper_surface(torus, config, lambda stage, *_: stages.append(stage), deploy=DEPLOY)
+    result = train_paper_surface(torus, config, note, deploy=DEPLOY)
     assert stages[0] == "train"
     assert list(dict.fromkeys(stages))[-2:] == ["fit uv", "fit charts"]
     charts = result.charts
