@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor, nn
@@ -21,6 +22,12 @@ from torch.nn.functional import leaky_relu
 
 from ..networks import Dense
 from .config import PaperNets
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+BLOCK = 10_000
+"""Rows of a layer that are computed at once on the CPU: 20 MB of float32 at width 512."""
 
 
 class Affine(Dense):
@@ -135,6 +142,18 @@ class CodedPerceptron(nn.Module):
         return self.decode.jet(torch.cat([self.code.jet(x, dtype), x], dim=-1), dtype)
 
 
+def in_blocks(function: Callable[[Tensor], tuple[Tensor, ...]], x: Tensor, rows: int) -> tuple[Tensor, ...]:
+    """``function`` of x (…, n, c) in blocks of points, results joined along the points; ``rows`` a point in each layer.
+
+    On the CPU only.  Activations of all points at once are so large that the C library maps and clears fresh pages for
+    each of them, which takes a third of a step of eight charts.
+    """
+    if x.device.type != "cpu":
+        return function(x)
+    blocks = [function(part) for part in x.split(max(1, BLOCK // rows), dim=-2)]
+    return tuple(torch.cat(parts, dim=-2) for parts in zip(*blocks, strict=True))
+
+
 def plane_jet(uv: Tensor) -> Tensor:
     """A jet of uv (…, n, 2) along its own two directions: (3, …, n, 2)."""
     unit = torch.eye(2, dtype=uv.dtype, device=uv.device)
@@ -160,19 +179,19 @@ class GlobalNetworks(nn.Module):
 
     def flatten(self, xyz: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """P → Q, or P̂ → Q̂_cycle: (n, 3) → (n, 2)."""
-        return self.unwrap_net.run(self.cut_net.run(xyz, dtype) + xyz, dtype)
+        return in_blocks(lambda part: (self.unwrap_net.run(self.cut_net.run(part, dtype) + part, dtype),), xyz, 1)[0]
 
     def deform(self, lattice: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """G → Q̂: (m, 2) → (m, 2)."""
-        return self.deform_net.run(lattice, dtype) + lattice
+        return in_blocks(lambda part: (self.deform_net.run(part, dtype) + part,), lattice, 1)[0]
 
     def fold(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """Wrap-Net: uv (n, 2) → position and normal (n, 6), the normal of any length."""
-        return self.wrap_net.run(uv, dtype)
+        return in_blocks(lambda part: (self.wrap_net.run(part, dtype),), uv, 1)[0]
 
     def fold_jet(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """As fold, with derivatives by u and v: (3, n, 6)."""
-        return self.wrap_net.jet(plane_jet(uv), dtype)
+        return in_blocks(lambda part: (self.wrap_net.jet(plane_jet(part), dtype),), uv, 3)[0]
 
     def wrap(self, uv: Tensor, patch: Tensor) -> tuple[Tensor, Tensor]:
         """The inverse map: uv (n, 2) → xyz (n, 3), unit normal (n, 3).  ``patch`` (n,) int64 is 0 everywhere."""
@@ -194,7 +213,7 @@ class MultiChartPaperNetworks(nn.Module):
         super().__init__()
         hidden, slope = nets.hidden, nets.slope
         thrice = (hidden,) * 3
-        self.slope = slope
+        self.slope, self.charts = slope, charts
         self.embedding = LeakyPerceptron((3, hidden, hidden), slope, generator=generator)
         self.assign = LeakyPerceptron((hidden, hidden, charts), slope, generator=generator)
         self.unwrap = LeakyPerceptron((*thrice, 2), slope, copies=charts, generator=generator)
@@ -217,8 +236,13 @@ class MultiChartPaperNetworks(nn.Module):
 
     def flatten(self, xyz: Tensor, dtype: torch.dtype = torch.float32) -> tuple[Tensor, Tensor]:
         """Logits (n, p) and uv (p, n, 2) of points (n, 3), or (p, n, 3) with points of its own for each chart."""
-        feature = leaky_relu(self.embedding.run(xyz, dtype, features=True), self.slope)
-        return self.assign.run(feature, dtype), self.unwrap.run(feature, dtype)
+
+        def block(part: Tensor) -> tuple[Tensor, Tensor]:
+            feature = leaky_relu(self.embedding.run(part, dtype, features=True), self.slope)
+            return self.assign.run(feature, dtype), self.unwrap.run(feature, dtype)
+
+        logits, uv = in_blocks(block, xyz, self.charts)
+        return logits, uv
 
     def deform(self, lattice: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """G → Q̂ of each chart: (m, 2) → (p, m, 2)."""
@@ -226,11 +250,11 @@ class MultiChartPaperNetworks(nn.Module):
 
     def fold(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """Wrap-Nets: uv (p, n, 2) → positions and normals (p, n, 6), normals of any length."""
-        return self.wrap_net.run(uv, dtype)
+        return in_blocks(lambda part: (self.wrap_net.run(part, dtype),), uv, len(uv))[0]
 
     def fold_jet(self, uv: Tensor, dtype: torch.dtype = torch.float32) -> Tensor:
         """As fold, with derivatives by u and v: (3, p, n, 6)."""
-        return self.wrap_net.jet(plane_jet(uv), dtype)
+        return in_blocks(lambda part: (self.wrap_net.jet(plane_jet(part), dtype),), uv, 3 * len(uv))[0]
 
     def wrap(self, uv: Tensor, patch: Tensor) -> tuple[Tensor, Tensor]:
         """The inverse map: uv (n, 2) of charts ``patch`` (n,) int64 → xyz (n, 3), unit normal (n, 3)."""

@@ -156,6 +156,23 @@ def test_bfloat16_changes_the_maps_by_less_than_a_hundredth() -> None:
     assert jet.dtype == torch.float32
 
 
+def test_blocks_of_points_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    single = GlobalNetworks(SMALL, generator=generator()).double()
+    several = MultiChartPaperNetworks(3, SMALL, generator=generator(), bidirectional=True).double()
+    xyz, uv = noise(11, 3), noise(3, 11, 2)
+
+    def everything() -> list[Tensor]:
+        exact = torch.float64
+        made = [single.flatten(xyz, exact), single.deform(uv[0], exact), single.fold(uv[0], exact)]
+        made += [single.fold_jet(uv[0], exact), *several.flatten(xyz, exact), *several.flatten(noise(3, 11, 3), exact)]
+        return [*made, several.deform(uv[0], exact), several.fold(uv, exact), several.fold_jet(uv, exact)]
+
+    whole = everything()
+    monkeypatch.setattr("flexpara.train.paper.networks.BLOCK", 12)
+    for first, second in zip(whole, everything(), strict=True):
+        torch.testing.assert_close(first, second)
+
+
 def test_a_plane_jet_carries_the_two_axes() -> None:
     jet = plane_jet(torch.tensor([[0.3, 0.7]]))
     assert jet.tolist() == [[[pytest.approx(0.3), pytest.approx(0.7)]], [[1.0, 0.0]], [[0.0, 1.0]]]
