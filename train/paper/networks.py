@@ -135,11 +135,11 @@ class CodedPerceptron(nn.Module):
 
     def run(self, x: Tensor, dtype: torch.dtype) -> Tensor:
         """As forward; see LeakyPerceptron.run."""
-        return self.decode.run(torch.cat([self.code.run(x, dtype), x], dim=-1), dtype)
+        return self.decode.run(torch.cat([self.code.run(x, dtype, features=True), x], dim=-1), dtype)
 
     def jet(self, x: Tensor, dtype: torch.dtype) -> Tensor:
         """As run, on jets (3, n, inputs)."""
-        return self.decode.jet(torch.cat([self.code.jet(x, dtype), x], dim=-1), dtype)
+        return self.decode.jet(torch.cat([self.code.jet(x, dtype, features=True), x], dim=-1), dtype)
 
 
 def in_blocks(function: Callable[[Tensor], tuple[Tensor, ...]], x: Tensor, rows: int) -> tuple[Tensor, ...]:
