@@ -16,11 +16,15 @@ from .runtime.errors import FlexparaError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from . import bake as bake
     from . import export as export
     from . import runtime as runtime
     from . import train as train
     from .export.unwrapping import Unwrapped
+    from .runtime.cloud import CloudMesh, PointCloud
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.meshfile import MeshLike
@@ -54,7 +58,7 @@ def __getattr__(name: str) -> object:
 
 
 def unwrap(
-    mesh: MeshLike,
+    mesh: MeshLike | PointCloud,
     *,
     charts: int = 8,
     size: int = 2048,
@@ -68,10 +72,11 @@ def unwrap(
     ablation: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> UnwrapResult:
-    """Unwrap a mesh.
+    """Unwrap a mesh, or a point cloud.
 
     Args:
-        mesh: a path, a trimesh.Trimesh, or (vertices (n, 3), faces (f, 3)).
+        mesh: a path, a trimesh.Trimesh, (vertices (n, 3), faces (f, 3)), or a runtime.cloud.PointCloud.  A file
+            without faces (.ply, .xyz, .npy, …) is a point cloud.
         charts: the most charts a connected surface may get.
         size: atlas side, texels.
         padding: texels kept free around each chart; None is size / 256, at least 2.
@@ -89,11 +94,27 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[train] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
-    from .runtime.meshfile import load
+    from .runtime.cloud import PointCloud
     from .runtime.options import Options
 
     options = Options(charts, size, padding, seed, preset, mode, steps, width, precision, tuple(ablation))
-    return unwrap_asset(load(mesh), options, progress)
+    source = load_any(mesh)
+    if isinstance(source, PointCloud):
+        return unwrap_cloud(source, options, progress)
+    return unwrap_asset(source, options, progress)
+
+
+def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
+    """A mesh as an Asset, a file without faces as a PointCloud.  Raises: InputError when it is neither."""
+    from .runtime.cloud import PointCloud
+    from .runtime.cloudfile import is_cloud, load_cloud
+    from .runtime.meshfile import load
+
+    if isinstance(source, PointCloud):
+        return source
+    if isinstance(source, str | Path) and is_cloud(Path(source)):
+        return load_cloud(Path(source))
+    return load(source)
 
 
 def unwrap_asset(
@@ -111,12 +132,40 @@ def unwrap_asset(
     return UnwrapResult(asset, assemble(asset, trained, clock, size=options.size, padding=options.margin))
 
 
+def unwrap_cloud(
+    cloud: PointCloud, options: Options, progress: Progress | None = None, keep: tuple[Path, int] | None = None
+) -> UnwrapResult:
+    """Lay triangles over the points, then as `unwrap_asset`.
+
+    Raises: as `unwrap`; MeshError where the points show no surface.
+    """
+    from .runtime.extras import requires
+    from .runtime.progress import Clock
+
+    with requires("train"):
+        from .export.unwrapping import assemble, train_asset
+        from .train.reconstruct import reconstruct
+
+    clock = Clock(progress)
+    with clock.stage("triangulate"):
+        mesh = reconstruct(cloud)
+    trained = train_asset(mesh.asset, options, clock, keep, cloud)
+    found = assemble(mesh.asset, trained, clock, size=options.size, padding=options.margin)
+    return UnwrapResult(mesh.asset, found, cloud, mesh)
+
+
 @dataclass(frozen=True, eq=False)
 class UnwrapResult:
-    """An unwrapped mesh.  asset: the mesh as read and cleaned.  found: what came of it."""
+    """An unwrapped mesh or point cloud.
+
+    asset: the mesh as read and cleaned, or the triangles laid over the points.  found: what came of it.
+    cloud, cloud_mesh: of a point cloud, the points and where each lies on those triangles; else None.
+    """
 
     asset: Asset
     found: Unwrapped = field(repr=False)
+    cloud: PointCloud | None = field(default=None, repr=False)
+    cloud_mesh: CloudMesh | None = field(default=None, repr=False)
 
     @property
     def charts(self) -> Charts:
@@ -132,6 +181,18 @@ class UnwrapResult:
     def atlas(self) -> Atlas:
         """Packed charts."""
         return self.found.atlas
+
+    def point_uv(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Of a point cloud: uv (n, 2) float32 in [0, 1], v up, and chart (n,) int64 of each of its points.
+
+        Raises: InputError for a mesh, whose uv are those of the atlas.
+        """
+        from .runtime.cloud import point_uv
+        from .runtime.errors import InputError
+
+        if self.cloud_mesh is None:
+            raise InputError("point_uv of a mesh, expected a point cloud; use result.atlas")
+        return point_uv(self.cloud_mesh, self.atlas)
 
     @property
     def model(self) -> AtlasNetworks:
@@ -156,37 +217,62 @@ class UnwrapResult:
         formats: Sequence[str] = ("glb",),
         preview: bool = True,
         inverse: bool = False,
+        target: str | None = None,
+        samples: int = 1,
+        rays: int = 64,
         force: bool = False,
         progress: Progress | None = None,
     ) -> tuple[Path, ...]:
         """Write mesh, ONNX file, textures, preview and report, all or none; returns their paths.  See Outputs.
 
         Raises:
-            InputError: an unknown map or format, or a size that this OpenGL device can't draw.
+            InputError: an unknown map, format or target.
             ForeignFileError: a file is in the way that flexpara did not write, and force is off.
-            MissingDependencyError: the packages of flexpara[bake], or OpenGL, are absent.
+            MissingDependencyError: the packages of flexpara[bake] are absent.
         """
-        from .bake.output import check_outputs
         from .runtime.files import OutputFolder
         from .runtime.options import Outputs
 
-        outputs = Outputs(tuple(maps), tuple(formats), preview, inverse=inverse).for_asset(self.asset)
+        outputs = Outputs(
+            tuple(maps), tuple(formats), preview, inverse=inverse, target=target, samples=samples, rays=rays
+        )
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
-            check_outputs(output, outputs, self.atlas.size)
             return self.write(output, outputs, progress)
 
     def write(self, output: OutputFolder, outputs: Outputs, progress: Progress | None = None) -> tuple[Path, ...]:
-        """As `save`, into an open OutputFolder; outputs without "auto"."""
-        from .bake.output import write_outputs
+        """As `save`, into an open OutputFolder."""
+        from .bake.output import check_outputs, chosen_maps, write_outputs
         from .export.unwrapping import invert
         from .runtime.progress import Clock
 
+        outputs = outputs.for_asset(self.asset)
+        outputs = outputs if self.cloud is None else outputs.for_points()
+        maps = chosen_maps(outputs, seed=self.report["settings"]["seed"])
+        check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
         clock, report = Clock(progress), dict(self.report)
-        output.write(f"{output.stem}.onnx", lambda path: path.write_bytes(self.onnx))
+        networks = {"onnx": self.onnx}
+        if self.found.paper is not None:
+            networks["paper.onnx"] = self.found.paper
         if outputs.inverse:
-            content, report["inverse"] = invert(self.asset, self.found, clock)
-            output.write(f"{output.stem}.wrap.onnx", lambda path: path.write_bytes(content))
-        write_outputs(output, self.atlas, self.asset, outputs, clock)
+            networks["wrap.onnx"], report["inverse"] = invert(self.asset, self.found, clock)
+        for ending, content in networks.items():
+            output.write(f"{output.stem}.{ending}", lambda path, content=content: path.write_bytes(content))
+        if self.cloud is not None:
+            self._write_points(output, self.cloud)
+        report["textures"] = write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
         output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()
+
+    def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:
+        """The user's points with their uv and chart, as .npz and, in place of the mesh, as .ply."""
+        from .runtime.cloudwrite import write_cloud_npz, write_cloud_ply
+
+        uv, chart = self.point_uv()
+        for name, write in zip(point_files(output.stem), (write_cloud_ply, write_cloud_npz), strict=True):
+            output.write(name, lambda path, write=write: write(path, cloud, uv, chart))
+
+
+def point_files(stem: str) -> tuple[str, str]:
+    """The files that hold the points of a cloud."""
+    return f"{stem}.ply", f"{stem}.npz"

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Literal
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
-from . import UnwrapResult, __version__, load, unwrap_asset
+from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cloud
 from .bake.commands import bake
-from .bake.output import check_maps, check_outputs
+from .bake.output import check_outputs, chosen_maps, padding_of
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Flag, Output, complain, names, show
 from .runtime.errors import FlexparaError, InputError
@@ -65,6 +65,9 @@ def unwrap(
     format: str = "glb",
     texture_format: Literal["png", "exr"] | None = None,
     normal_format: Literal["opengl", "directx"] = "opengl",
+    target: str | None = None,
+    samples: int = 1,
+    rays: int = 64,
     inverse: Flag = False,
     preview: bool = True,
     seed: int = 0,
@@ -79,18 +82,22 @@ def unwrap(
     quiet: Flag = False,
     force: Flag = False,
 ) -> int:
-    """Unwrap a mesh into an atlas of few charts, an ONNX file and textures.
+    """Unwrap a mesh or a point cloud into an atlas of few charts, an ONNX file and textures.
 
     Args:
-        mesh: any file trimesh reads: obj, ply, stl, glb, gltf, off, …
+        mesh: any file trimesh reads: obj, ply, stl, glb, gltf, off, …; or points: ply without faces, xyz, csv, npy
         output: folder for STEM.glb, STEM.onnx, STEM_MAP.png or .exr, STEM.report.json and STEM.preview.png
         charts: the most charts a connected surface may get
         size: atlas side, texels
         padding: texels kept free around each chart (default: size / 256, at least 2)
-        maps: comma-separated; auto: normal, position, and the source's colours or else a checker; none: uv only
-        format: mesh files, comma-separated: glb, obj, ply
+        maps: comma-separated, see bake; auto: normal, position, and what the source's materials have, or else a
+            checker; none: uv only
+        format: mesh files, comma-separated: glb, obj, ply, usda
         texture_format: of all maps that can be stored so (default: each map's own)
         normal_format: green channel of the normal map: opengl (+Y) or directx (-Y)
+        target: gltf, unreal, unity, godot, blender or usd: file names, packing, depth, green channel and padding
+        samples: of each texel: 1, 4 or 16
+        rays: of ray-traced maps, per sample
         inverse: also write STEM.wrap.onnx: uv and chart to point and normal
         preview: draw STEM.preview.png
         seed: same seed, same machine, same bytes
@@ -113,8 +120,10 @@ def unwrap(
     if mesh is None or output is None:
         missing = "--mesh" if mesh is None else "--output"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
-    options = Options(charts, size, padding, seed, preset, mode, steps, width, precision, names(ablation))
-    outputs = Outputs(names(maps), names(format), preview, texture_format, normal_format, inverse)
+    margin = padding_of(padding, target, size)
+    options = Options(charts, size, margin, seed, preset, mode, steps, width, precision, names(ablation))
+    kinds = texture_format, normal_format
+    outputs = Outputs(names(maps), names(format), preview, *kinds, inverse, target, samples=samples, rays=rays)
     run = Run(mesh.absolute(), output, options, outputs, checkpoint_every)
     return _perform(run, quiet=quiet, force=force)
 
@@ -122,16 +131,21 @@ def unwrap(
 def _perform(run: Run, *, quiet: bool, force: bool) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
+    from .runtime.mesh import Asset
 
-    check_maps(run.outputs.maps)
-    asset = load(run.mesh)
-    outputs = run.outputs.for_asset(asset)
-    with OutputFolder(run.output, asset.stem, force=force, source=run.mesh) as folder:
-        check_outputs(folder, outputs, run.options.size)
+    chosen_maps(run.outputs)
+    source = load_any(run.mesh)
+    with OutputFolder(run.output, source.stem, force=force, source=run.mesh) as folder:
+        if isinstance(source, Asset):
+            outputs = run.outputs.for_asset(source)
+            check_outputs(folder, outputs, chosen_maps(outputs))
         run.save()
         with progress_bars(quiet=quiet) as progress:
-            result = unwrap_asset(asset, run.options, progress, run.keep)
-            written = result.write(folder, outputs, progress)
+            if isinstance(source, Asset):
+                result = unwrap_asset(source, run.options, progress, run.keep)
+            else:
+                result = unwrap_cloud(source, run.options, progress, run.keep)
+            written = result.write(folder, run.outputs, progress)
     run.forget()
     if not quiet:
         show({**result.report["metrics"], **result.report["network"]}, written)
@@ -233,13 +247,12 @@ def export(
     """
     options = Options(size=size, padding=padding)
     outputs = Outputs(names(maps), names(format), preview, inverse=inverse)
-    check_maps(outputs.maps)
+    chosen_maps(outputs)
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
-    outputs = outputs.for_asset(asset)
     with OutputFolder(output, asset.stem, force=force, source=mesh) as folder:
-        check_outputs(folder, outputs, size)
+        check_outputs(folder, outputs.for_asset(asset), chosen_maps(outputs.for_asset(asset)))
         with requires("train"):
             from .export.unwrapping import assemble
             from .train.saved import read_trained

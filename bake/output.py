@@ -5,10 +5,14 @@ OpenGL and image libraries are imported when something needs them: an obj file a
 
 from __future__ import annotations
 
+import tempfile
+import warnings
+from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import InputError
+from ..runtime.errors import MissingDependencyError
 from ..runtime.extras import requires
 
 if TYPE_CHECKING:
@@ -17,103 +21,231 @@ if TYPE_CHECKING:
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
     from ..runtime.options import Outputs
-    from ..runtime.progress import Clock, Progress
+    from ..runtime.progress import Clock
+    from .highmaps import HighSource
+    from .images import Texture
+    from .maps import BakeMap
+
+LARGE = 8192
+"""Side from which images are kept on disk while they are baked."""
+USD_KEYS = {"orm": "occlusionRoughnessMetallic"}
+"""Products of the USD preset that have another name among flexpara's own maps."""
 
 
-def write_outputs(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, clock: Clock) -> None:
-    """Textures, meshes in each format, preview.  outputs: without "auto".
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """Textures by map, and their files: product (a map, or a packed file of a target) → file name."""
 
-    Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
+    textures: dict[str, Texture]
+    files: dict[str, str]
+
+
+def chosen_maps(
+    outputs: Outputs, *, high: HighSource | None = None, fields: Sequence[Path] = (), seed: int = 0
+) -> list[BakeMap]:
+    """The maps asked for, without "auto".
+
+    Args:
+        outputs: names, normal format, rays.
+        high: high-poly meshes that the maps are taken from.
+        fields: ONNX files, one more map each.
+        seed: of the rays.
+
+    Raises: InputError for an unknown map or a field that is none; MissingDependencyError without flexpara[bake].
     """
-    textures = write_textures(output, atlas, asset, outputs, atlas.padding, clock)
-    with clock.stage("write"):
-        write_meshes(output, atlas, asset, outputs, textures)
-    if outputs.preview:
-        from ..runtime.metrics import face_distortion
-        from .preview import render_preview
+    if not outputs.maps and not fields:
+        return []
+    with requires("bake"):
+        from .field import field_map
+        from .maps import find_map
+        from .rays import RaySettings
+    green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
+    entries = [find_map(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
+    if high is not None:
+        entries = [high.map(entry, normal_format=green, rays=rays) for entry in entries]
+    return [*entries, *(field_map(path) for path in fields)]
 
-        with clock.stage("preview"):
-            stretch = face_distortion(asset.surface, atlas.corner_uv)
-            output.write(f"{output.stem}.preview.png", lambda path: render_preview(atlas, stretch, path))
 
+def check_outputs(
+    output: OutputFolder, outputs: Outputs, maps: Sequence[BakeMap], *, more: Sequence[str] = (), meshes: bool = True
+) -> None:
+    """Refuse early what writing would refuse after the work: foreign files, packages that are absent.
 
-def check_outputs(output: OutputFolder, outputs: Outputs, size: int, *, meshes: bool = True) -> None:
-    """Refuse early what writing would refuse after the work: unknown maps, foreign files, OpenGL absent or too small.
+    more: further file names.  meshes: whether meshes and networks are written.
 
     Raises: InputError, ForeignFileError, MissingDependencyError.
     """
-    names = list(texture_files(output.stem, outputs).values())
+    names = [*possible_files(output.stem, outputs, maps), *more]
     if meshes:
         endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
         names += [f"{output.stem}.{ending}" for ending in endings]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
     output.check([*names, output.report_name])
-    wanted = {"baker": bool(outputs.maps), "gltf": meshes and "glb" in outputs.formats, "preview": outputs.preview}
+    wanted = {"baker": bool(maps), "gltf": meshes and "glb" in outputs.formats, "preview": outputs.preview}
     with requires("bake"):
         for module in (name for name, needed in wanted.items() if needed):
             import_module(f".{module}", __package__)
-    if outputs.maps or outputs.preview:
-        from .context import describe
-
-        limit = describe().max_size
-        if outputs.maps and size > limit:
-            raise InputError(f"size is {size}, this OpenGL device draws up to {limit} texels; pass --size {limit}")
 
 
-def check_maps(names: Sequence[str]) -> None:
-    """Raises: InputError for an unknown map, MissingDependencyError when maps are wanted and can't be made."""
-    if names:
-        with requires("bake"):
-            from .maps import find_map
-        for name in names:
-            if name != "auto":
-                find_map(name)
-
-
-def texture_files(stem: str, outputs: Outputs) -> dict[str, str]:
-    """Map → file name.  Raises: InputError for an unknown map."""
-    if not outputs.maps:
-        return {}
+def padding_of(padding: int | None, target: str | None, size: int) -> int | None:
+    """The padding asked for, else that of the target, else None.  Raises: InputError for an unknown target."""
+    if target is None:
+        return padding
     with requires("bake"):
+        from .targets import find_target
+    preset = find_target(target)
+    return preset.padding(size) if padding is None else padding
+
+
+def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list[str]:
+    """Texture files that these maps may become; with a target, both endings that a product may get.
+
+    Raises: InputError for an unknown target.
+    """
+    if not maps:
+        return []
+    if outputs.layers:
+        return [f"{stem}.exr"]
+    if outputs.target is None:
         from .baker import texture_names
-        from .maps import find_map
-    entries = {name: find_map(name, normal_format=outputs.normal_format) for name in outputs.maps}
-    return texture_names(cast("Any", entries), stem, file_type=outputs.texture_format)
+
+        return list(
+            texture_names({entry.name: entry for entry in maps}, stem, file_type=outputs.texture_format).values()
+        )
+    from .targets import find_target
+
+    plain = find_target(outputs.target).file_names([entry.name for entry in maps], stem).values()
+    return [f"{name}.{ending}" for name in plain for ending in ("png", "exr")]
+
+
+def write_outputs(
+    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
+) -> dict[str, Any]:
+    """Textures, meshes in each format, preview; what was found about the textures, for the report.
+
+    outputs: without "auto".  Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
+    """
+    atlas = with_tangents(atlas, maps)
+    baked = write_textures(output, atlas, asset, outputs, maps, atlas.padding, clock)
+    with clock.stage("write"):
+        write_meshes(output, atlas, asset, outputs, baked)
+    if outputs.preview:
+        with clock.stage("preview"):
+            _write_preview(output, atlas, asset)
+    return texture_facts(atlas, baked)
+
+
+def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
+    """The atlas as it is written: each vertex in one tangent group where a map is in tangent space."""
+    if not any(entry.space.startswith("tangent") for entry in maps):
+        return atlas
+    from .tangents import split_by_tangents
+
+    return split_by_tangents(atlas)
 
 
 def write_textures(
-    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, padding: int, progress: Progress
-) -> dict[str, Any]:
-    """Bake the maps and write them; map → Texture."""
-    if not outputs.maps:
-        return {}
+    output: OutputFolder,
+    atlas: Atlas,
+    asset: Asset,
+    outputs: Outputs,
+    maps: Sequence[BakeMap],
+    padding: int,
+    clock: Clock,
+) -> Baked:
+    """Bake the maps and write them."""
+    if not maps:
+        return Baked({}, {})
     from . import baker
 
-    names = list(outputs.maps)
+    names = [entry.name for entry in maps]
     textures = baker.bake(
         atlas,
         asset,
-        outputs.maps,
+        list(maps),
         padding=padding,
-        normal_format=outputs.normal_format,
-        progress=lambda name: progress("bake", names.index(name), len(names)),
+        samples=outputs.samples,
+        scratch=Path(tempfile.gettempdir()) if atlas.size >= LARGE else None,
+        progress=lambda name: clock("bake", names.index(name), len(names)),
     )
-    kind, first = outputs.texture_format, next(iter(texture_files(output.stem, outputs).values()))
-    output.write(first, lambda path: baker.write_textures(textures, path.parent, output.stem, file_type=kind))
-    return textures
+    clock("bake", len(names), len(names))
+    with clock.stage("write textures"):
+        return Baked(textures, _write_files(output, textures, asset, outputs))
 
 
-def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, textures: dict[str, Any]) -> None:
+def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asset, outputs: Outputs) -> dict[str, str]:
+    """Texture files by product: those of the target, one EXR with layers, or one a map."""
+    stem, found = output.stem, {}
+    if outputs.layers:
+        from .exr import file_metadata, write_layers
+
+        metadata = file_metadata(asset, normal_format=outputs.normal_format)
+        output.write(f"{stem}.exr", lambda path: write_layers(textures, path, metadata=metadata))
+        return dict.fromkeys(textures, f"{stem}.exr")
+    if outputs.target is not None:
+        from .targets import find_target, write_target
+
+        target = find_target(outputs.target)
+
+        def write(folder: Path) -> None:
+            found.update({name: path.name for name, path in write_target(textures, folder, stem, target).items()})
+
+        output.write_several(write)
+        return found
+    from .baker import texture_names
+    from .baker import write_textures as write_each
+
+    kind = outputs.texture_format
+    output.write_several(lambda folder: write_each(textures, folder, stem, file_type=kind))
+    return texture_names(textures, stem, file_type=kind)
+
+
+def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
     """The mesh in each format asked for."""
     from ..runtime.meshwrite import write_obj, write_ply
 
-    pictures = texture_files(output.stem, outputs)
-    shown = next((pictures[name] for name in ("base-color", "uv-checker", "chart") if name in pictures), None)
+    stem, files = output.stem, baked.files
+    shown = next((files[name] for name in ("base-color", "uv-checker", "chart") if name in files), None)
     if "glb" in outputs.formats:
         with requires("bake"):
             from .gltf import write_glb
-        output.write(f"{output.stem}.glb", lambda path: write_glb(atlas, asset, textures, path))
+            from .targets import GLTF, with_green
+        # glTF's normal maps are +Y whatever the files beside it are
+        textures = {
+            name: with_green(texture, GLTF.green) if name == "normal" else texture
+            for name, texture in baked.textures.items()
+        }
+        output.write(f"{stem}.glb", lambda path: write_glb(atlas, asset, textures, path))
     if "obj" in outputs.formats:
-        output.write(f"{output.stem}.obj", lambda path: write_obj(atlas, path, texture=shown))
+        output.write(f"{stem}.obj", lambda path: write_obj(atlas, path, texture=shown))
     if "ply" in outputs.formats:
-        output.write(f"{output.stem}.ply", lambda path: write_ply(atlas, path, colors=asset.colors))
+        output.write(f"{stem}.ply", lambda path: write_ply(atlas, path, colors=asset.colors))
+    if "usda" in outputs.formats:
+        with requires("bake"):
+            from .usd import write_usda
+        color = baked.textures.get("base-color")
+        alpha = color is not None and color.pixels.shape[2] == 4
+        named = {USD_KEYS.get(name, name): file for name, file in files.items()}
+        output.write(f"{stem}.usda", lambda path: write_usda(atlas, asset, named, path, alpha=alpha))
+
+
+def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
+    """What the report says of the textures: their files, and how far the two sides of seams differ in each."""
+    if not baked.textures:
+        return {}
+    from .seamcheck import seam_report
+
+    return {"files": baked.files, "seam_error": seam_report(atlas, baked.textures)}
+
+
+def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
+    """The preview; without OpenGL a warning in its place."""
+    from ..runtime.metrics import face_distortion
+    from .preview import render_preview
+    from .tiles import SoftwareWarning
+
+    stretch = face_distortion(asset.surface, atlas.corner_uv)
+    try:
+        output.write(f"{output.stem}.preview.png", lambda path: render_preview(atlas, stretch, path))
+    except MissingDependencyError as error:
+        warnings.warn(f"no preview is drawn, since {error}", SoftwareWarning, stacklevel=2)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..runtime.agreement import agreement
-from ..runtime.mesh import Surface
+from ..runtime.mesh import Frame, Surface
 from ..runtime.metrics import measure
 from ..runtime.packing import pack
 from ..runtime.session import UnwrapSession
@@ -22,9 +22,11 @@ from ..train.paper.config import Ablation, PaperConfig
 from ..train.pipeline import train
 from .metadata import Provenance
 from .onnx import export_onnx
+from .raw import raw_onnx
 
 if TYPE_CHECKING:
-    from ..runtime.mesh import Asset, Atlas, Charts, Frame
+    from ..runtime.cloud import PointCloud
+    from ..runtime.mesh import Asset, Atlas, Charts
     from ..runtime.options import Options
     from ..runtime.progress import Clock
     from ..train.networks import AtlasNetworks
@@ -41,6 +43,7 @@ class Unwrapped:
 
     charts: flat, not packed.  frame: source units → unit ball.  atlas: packed charts.
     model: the torch module behind the ONNX file.  onnx: the bytes of that file.
+    paper: those of the networks of preset paper as they were trained, else None.
     report: changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON.
     """
 
@@ -50,20 +53,35 @@ class Unwrapped:
     model: AtlasNetworks
     onnx: bytes = field(repr=False)
     report: dict[str, Any] = field(repr=False)
+    paper: bytes | None = field(default=None, repr=False)
 
 
-def train_asset(asset: Asset, options: Options, clock: Clock, keep: Keep | None = None) -> Trained:
-    """Charts and networks by the preset asked for.  keep: where and how often preset paper keeps checkpoints.
+def train_asset(
+    asset: Asset, options: Options, clock: Clock, keep: Keep | None = None, cloud: PointCloud | None = None
+) -> Trained:
+    """Charts and networks by the preset asked for.
+
+    Args:
+        asset: what is charted.
+        options: preset and what it needs.
+        clock: told the stages.
+        keep: where and how often preset paper keeps checkpoints.
+        cloud: the points that the asset's triangles were laid over: preset paper is then trained on points alone.
 
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
-    if options.preset == "paper":
-        from ..train.checkpoint import Checkpoints
-        from ..train.paper.pipeline import train_paper_surface
+    if options.preset != "paper":
+        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
+    from ..train.checkpoint import Checkpoints
+    from ..train.paper.batches import PaperInput
+    from ..train.paper.pipeline import train_paper_surface
 
-        checkpoints = None if keep is None else Checkpoints(*keep)
-        return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints)
-    return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
+    samples = None
+    if cloud is not None:
+        ball = Frame.of(asset.surface.vertices).apply(asset.surface.vertices)
+        samples = PaperInput(ball, None if cloud.normals is None else asset.normals)
+    checkpoints = None if keep is None else Checkpoints(*keep)
+    return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints, samples=samples)
 
 
 def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding: int) -> Unwrapped:
@@ -91,9 +109,10 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
         parity = export_onnx(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
         network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
+        paper = None if trained.paper is None else raw_onnx(trained.paper, asset.surface, trained.frame, size, facts)
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
-    return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report)
+    return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
 
 
 def paper_config(options: Options) -> PaperConfig:

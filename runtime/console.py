@@ -22,6 +22,7 @@ SUMMARY = {
     "packing_efficiency": "{:.1%}",
     "rms_texels": "{:.2f}",
     "chart_agreement": "{:.2%}",
+    "missed_share": "{:.2%}",
 }
 
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]

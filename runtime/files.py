@@ -122,6 +122,17 @@ class OutputFolder:
             raise InputError(f"nothing was written as {name}; this is a defect worth reporting")
         self.check(set(self.names) - before)
 
+    def write_several(self, writer: Callable[[Path], object]) -> None:
+        """Write files into the hidden folder that the writer is called with, unseen until `commit`.
+
+        Raises:
+            ForeignFileError, InputError: as `check`, for each of them.
+        """
+        staging = self._stage()
+        before = set(self.names)
+        writer(staging)
+        self.check(set(self.names) - before)
+
     def write_report(self, report: Report) -> None:
         """Write the report: JSON, with `producer`, and the `files` of this run and of earlier ones still there."""
         kept = {name for name in self._own if (self.folder / name).is_file()}

@@ -16,7 +16,7 @@ MODES = ("multi-chart", "global")
 PRECISIONS = ("float32", "bfloat16")
 ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirectional", "chart-differential")
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
-FORMATS = ("glb", "obj", "ply")
+FORMATS = ("glb", "obj", "ply", "usda")
 LARGEST_SEED = 2**32 - 1
 AUTO = "auto"
 
@@ -81,11 +81,14 @@ class Options:
 class Outputs:
     """What is written beside the ONNX file and the report.
 
-    maps: names of maps, or "auto": normal, position, and base-color where the source has colours, else uv-checker.
-    formats: of "glb", "obj", "ply", at least one.  preview: whether the preview picture is drawn.
+    maps: names of maps, or "auto": normal, position, and what the source's materials have, else uv-checker.
+    formats: of "glb", "obj", "ply", "usda", at least one.  preview: whether the preview picture is drawn.
     texture_format: for all maps that can be stored so; None is each map's own.
     normal_format: green channel of the normal map, "opengl" (+Y) or "directx" (−Y).
     inverse: whether the inverse map, `<stem>.wrap.onnx`, is made.
+    target: engine preset of file names, packing, depth and green channel; None is flexpara's own.
+    layers: all maps as layers of one EXR file.
+    samples: per texel: 1, 4 or 16.  rays: per sample of ray-traced maps, 1 to 4096.
 
     Raises: InputError for an unknown format.
     """
@@ -96,6 +99,10 @@ class Outputs:
     texture_format: Literal["png", "exr"] | None = None
     normal_format: Literal["opengl", "directx"] = "opengl"
     inverse: bool = False
+    target: str | None = None
+    layers: bool = False
+    samples: int = 1
+    rays: int = 64
 
     def __post_init__(self) -> None:
         found, known = ", ".join(self.formats), ", ".join(FORMATS)
@@ -104,13 +111,21 @@ class Outputs:
         kind, green = self.texture_format, self.normal_format
         _demand(kind in (None, "png", "exr"), f"texture format is {kind!r}, expected png or exr; choose one of them")
         _demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
+        _demand(self.samples in (1, 4, 16), f"samples is {self.samples}, expected 1, 4 or 16; choose one of them")
+        _demand(1 <= self.rays <= 4096, f"rays is {self.rays}, expected 1 to 4096; pass for instance --rays 64")
 
     def for_asset(self, asset: Asset) -> Outputs:
         """The same with "auto" replaced by the maps it stands for, each map once."""
-        colored = asset.colors is not None or any(material.base_color is not None for material in asset.materials)
-        auto = ("normal", "position", "base-color" if colored else "uv-checker")
+        from .materials import source_maps
+
+        auto = ("normal", "position", *(source_maps(asset) or ("uv-checker",)))
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
         return replace(self, maps=tuple(dict.fromkeys(maps)))
+
+    def for_points(self) -> Outputs:
+        """The same without the triangles as ply, whose name the points have; glb where that leaves none."""
+        left = tuple(name for name in self.formats if name != "ply")
+        return replace(self, formats=left or ("glb",))
 
 
 def _demand(holds: bool, message: str) -> None:

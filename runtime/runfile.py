@@ -101,12 +101,12 @@ def read_run(path: Path, output: Path) -> Run:
             raise InputError(
                 f"{path}: format is {str(facts['format'])[:60]!r}, expected {FORMAT!r}; start the run anew"
             )
-        options, outputs = (
+        parts: list[dict[str, Any]] = [
             {name: tuple(value) if isinstance(value, list) else value for name, value in facts[part].items()}
             for part in ("options", "outputs")
-        )
+        ]
         every = None if facts["every"] is None else int(facts["every"])
-        run = Run(Path(facts["mesh"]), output.absolute(), Options(**options), Outputs(**outputs), every)
+        run = Run(Path(facts["mesh"]), output.absolute(), Options(**parts[0]), Outputs(**parts[1]), every)
     except InputError:
         raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:

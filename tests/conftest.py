@@ -65,6 +65,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
             frame=Frame.of(surface.vertices),
             settings={"preset": "fast", **asdict(settings)},
             report={},
+            paper=None,
         )
 
     monkeypatch.setattr(unwrapping, "train", train)

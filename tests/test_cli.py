@@ -14,7 +14,6 @@ import flexpara
 import flexpara.bake.context
 from flexpara import __main__ as cli
 from flexpara.__main__ import main
-from flexpara.bake.context import ContextInfo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -246,19 +245,6 @@ def test_the_input_is_never_overwritten(
 ) -> None:
     assert "square.obj" in fails(2, "unwrap", square, "-o", square.parent, "--format", "obj", "--force", *QUICK)
     assert square.read_text(encoding="utf-8") == UV_SQUARE
-    assert instant_training == []
-
-
-def test_a_size_that_the_device_cannot_draw_is_refused_before_training(
-    square: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    fails: Callable[..., str],
-    instant_training: list[Surface],
-) -> None:
-    small = ContextInfo(renderer="tiny", version="3.3", max_size=1024, hardware=False)
-    monkeypatch.setattr(flexpara.bake.context, "describe", lambda: small)
-    assert "1024" in fails(2, "unwrap", square, "-o", tmp_path / "out", "--size", "2048")
     assert instant_training == []
 
 

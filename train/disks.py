@@ -103,7 +103,8 @@ def _leftover_edges(table: EdgeTable, cost: NDArray[np.float64], paths: Shortest
     weight = loop.max(initial=0.0) + 1.0 - loop[kept]
     dual = sparse.csr_array((weight, (i[kept], j[kept])), shape=(faces, faces))
     tree = minimum_spanning_tree(dual).tocoo()
-    chosen = np.isin(i * faces + j, np.concatenate([tree.row * faces + tree.col, tree.col * faces + tree.row]))
+    row, column = tree.row.astype(np.int64), tree.col.astype(np.int64)  # scipy's int32 can't hold faces² from 46,341 on
+    chosen = np.isin(i * faces + j, np.concatenate([row * faces + column, column * faces + row]))
     unique = np.zeros(len(candidates), dtype=bool)
     unique[kept] = True
     return candidates[~(chosen & unique)]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+    from torch import nn
 
     from .config import PatchConfig, TrainConfig
 
@@ -41,6 +42,7 @@ class Trained:
 
     charts: valid, in source units.  networks: unit ball → logits (n, p) and chart uv (n, p, 2) in source units.
     frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.
+    paper: the networks of preset paper as they were trained: unit ball → logits (n, p), raw uv (n, p, 2); else None.
     """
 
     charts: Charts
@@ -48,6 +50,7 @@ class Trained:
     frame: Frame
     settings: dict[str, Any]
     report: dict[str, Any]
+    paper: nn.Module | None = None
 
 
 def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:

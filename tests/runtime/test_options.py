@@ -64,7 +64,7 @@ def test_auto_shows_the_colours_of_the_source_or_else_a_checker() -> None:
     picture = Material(base_color=np.zeros((1, 1, 4), np.uint8))
     assert Outputs().for_asset(asset()).maps == ("normal", "position", "uv-checker")
     assert Outputs().for_asset(asset(materials=(Material(),))).maps[-1] == "uv-checker"
-    assert Outputs().for_asset(asset(materials=(picture,))).maps[-1] == "base-color"
+    assert Outputs().for_asset(asset(materials=(picture,), uv=np.zeros((3, 2)))).maps[-1] == "base-color"
     assert Outputs().for_asset(asset(colors=np.zeros((3, 4), np.uint8))).maps[-1] == "base-color"
 
 

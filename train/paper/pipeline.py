@@ -8,7 +8,7 @@ that come back, in source units.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...runtime.overlap import signed_areas
 from ..config import TrainConfig
 from ..finish import finish
 from ..fit import fit_networks
-from ..pipeline import Progress, as_charts, in_turn
+from ..pipeline import Progress, Trained, as_charts, in_turn
 from ..sampling import sample_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     from ..checkpoint import Checkpoints
     from ..finish import Finished
-    from ..networks import AtlasNetworks
     from .config import PaperConfig
     from .networks import PaperNetworks
 
@@ -45,30 +44,15 @@ SEAM_SAMPLES = 10_000
 """Surface samples among which the paper's cut points are counted."""
 
 
-@dataclass(frozen=True, eq=False)
-class PaperTrained:
-    """Result of preset ``paper``.
-
-    charts: valid, in source units.  networks: fitted to them, unit ball → logits (n, p) and chart uv (n, p, 2) in
-    source units, as the preset ``fast`` has them.  paper: the paper's networks, unit ball → raw uv.  frame: source
-    units → unit ball.  settings: of the run; report: facts, "raw" as the paper measures and "finished"; JSON-ready.
-    """
-
-    charts: Charts
-    networks: AtlasNetworks
-    paper: PaperNetworks
-    frame: Frame
-    settings: dict[str, Any]
-    report: dict[str, Any]
-
-
 def train_paper_surface(
     surface: Surface,
     config: PaperConfig,
     progress: Progress,
     checkpoints: Checkpoints | None = None,
     deploy: TrainConfig | None = None,
-) -> PaperTrained:
+    *,
+    samples: PaperInput | None = None,
+) -> Trained:
     """Charts and networks of a welded surface by the paper's method.
 
     Args:
@@ -76,6 +60,7 @@ def train_paper_surface(
         config: mode, charts, and every number of training.
         progress: told stage, step, steps and loss.
         checkpoints: where training is saved and goes on from; None: nowhere.
+        samples: what is trained on, in the unit ball; None: the surface's vertices, their normals, and its faces.
         deploy: numbers of finishing, patches and the fit of the deployed networks; None: as preset ``fast`` has them.
 
     Raises:
@@ -87,7 +72,7 @@ def train_paper_surface(
     deploy = deploy or TrainConfig()
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
-    samples = PaperInput(ball.vertices, vertex_normals(ball), ball.faces)
+    samples = samples or PaperInput(ball.vertices, vertex_normals(ball), ball.faces)
     steps = config.steps
     paper = train_paper(samples, config, lambda step, loss: progress("train", step, steps, loss), checkpoints)
     finished, report = finish_learned(ball, as_numpy(paper), config, in_turn(progress), deploy)
@@ -96,7 +81,7 @@ def train_paper_surface(
     report["finished"] = finished_figures(surface, charts, finished)
     networks = fit_networks(ball, charts, deploy.net, deploy.fit, config.seed, progress)
     settings = {"preset": "paper", **asdict(config), "deploy": asdict(deploy)}
-    return PaperTrained(charts, networks, paper, frame, settings, report)
+    return Trained(charts, networks, frame, settings, report, paper)
 
 
 def finish_learned(
