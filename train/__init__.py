@@ -2,6 +2,7 @@
 
 import os
 
-# torch's OpenMP threads spin while they wait for each other.  On a busy machine that made training ten times slower,
-# on an idle one sleeping instead costs nothing that could be measured.  Read once, when torch is first imported.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+# torch's threads (GNU OpenMP) spin for milliseconds while they wait for each other.  Beside other programs that doubled
+# the time of fitting networks this small and more; to sleep at once doubles it on an idle machine.  This many turns,
+# some microseconds, cost nothing there and little here.  Read once, when torch is first imported.
+os.environ.setdefault("GOMP_SPINCOUNT", "1000")
