@@ -6,10 +6,11 @@ Results and summaries go to stdout, progress and errors to stderr.  Exit codes: 
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
@@ -51,6 +52,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return complain(str(error), error.exit_code)
     except KeyboardInterrupt:
         return complain("interrupted, nothing half-written is left", INTERRUPTED)
+
+
+def run() -> NoReturn:
+    """`main` for a process of its own: ends without taking torch and OpenGL down piece by piece, which takes 0.6 s."""
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 @app.command
@@ -294,4 +303,4 @@ def _opengl() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run()

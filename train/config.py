@@ -138,6 +138,8 @@ class FinishConfig:
     """Times faces that can't be flattened are halved before xatlas gets them."""
     necks: int = 2
     """Borders tried for each split and seed."""
+    slit_splits: int = 2
+    """Of those, the cheapest that are weighed with slits too."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
     bump: float = 0.03
@@ -172,11 +174,11 @@ class FitConfig:
 
     samples: int = 60000
     """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
-    unwrap_steps: int = 500
+    unwrap_steps: int = 400
     """Optimizer steps of the Unwrap-Nets."""
     unwrap_batch: int = 64
     """Samples a step and patch."""
-    assign_steps: int = 700
+    assign_steps: int = 600
     """Optimizer steps of the Assign-Net."""
     assign_batch: int = 1024
     """Samples a step."""
