@@ -78,7 +78,7 @@ def unwrap(
     samples: int = 1,
     rays: int = 64,
     inverse: Flag = False,
-    preview: bool = True,
+    preview: bool | None = None,
     seed: int = 0,
     preset: str = "fast",
     mode: str = "multi-chart",
@@ -108,7 +108,7 @@ def unwrap(
         samples: of each texel: 1, 4 or 16
         rays: of ray-traced maps, per sample
         inverse: also write STEM.wrap.onnx: uv and chart to point and normal
-        preview: draw STEM.preview.png
+        preview: draw STEM.preview.png (default: where maps are drawn)
         seed: same seed, same machine, same bytes
         preset: fast: seconds on a CPU; paper: trained as published, best on a GPU
         mode: of preset paper: multi-chart or global (one chart)
@@ -132,7 +132,8 @@ def unwrap(
     margin = padding_of(padding, target, size)
     options = Options(charts, size, margin, seed, preset, mode, steps, width, precision, names(ablation))
     kinds = texture_format, normal_format
-    outputs = Outputs(names(maps), names(format), preview, *kinds, inverse, target, samples=samples, rays=rays)
+    drawn = bool(names(maps)) if preview is None else preview
+    outputs = Outputs(names(maps), names(format), drawn, *kinds, inverse, target, samples=samples, rays=rays)
     run = Run(mesh.absolute(), output, options, outputs, checkpoint_every)
     return _perform(run, quiet=quiet, force=force)
 

@@ -138,8 +138,6 @@ class FinishConfig:
     """Times faces that can't be flattened are halved before xatlas gets them."""
     necks: int = 2
     """Borders tried for each split and seed."""
-    slit_splits: int = 2
-    """Of those, the cheapest that are weighed with slits too."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
     bump: float = 0.03

@@ -34,14 +34,6 @@ class Weighed(NamedTuple):
     goal: float
 
 
-class Cut(NamedTuple):
-    """A way to split a piece.  cost: of its parts and the border between them; border: of that alone."""
-
-    cost: float
-    border: float
-    parts: list[Piece]
-
-
 class Regrouping:
     """The search's state: pieces of a surface, and the merges already weighed."""
 
@@ -171,25 +163,17 @@ class Regrouping:
             for parts_ids in necks(piece.ids, self.graph, self.centroids, self.areas, seed, self.config.necks)
         ]
         plain = iter(parallel_map(self.weigh, [ids for parts_ids in ways for ids in parts_ids]))
-        halved = [self.cut(parts_ids, [next(plain) for _ in parts_ids]) for parts_ids in ways]
-        valid = sorted((cut for cut in halved if cut is not None), key=lambda cut: cut.cost)[: self.config.slit_splits]
-        slit = iter(parallel_map(self.relieve, [part for cut in valid for part in cut.parts]))
+        flat = [(parts_ids, [next(plain) for _ in parts_ids]) for parts_ids in ways]
+        valid = [(ids, [part for part in parts if part is not None]) for ids, parts in flat if None not in parts]
+        relieved_parts = iter(parallel_map(self.relieve, [part for _, parts in valid for part in parts]))
         best = None
-        for cut in valid:
-            parts = [next(slit) for _ in cut.parts]
-            gain = piece.cost(price) - sum(part.cost(price) for part in parts) - cut.border
+        for parts_ids, parts in valid:
+            whole = [next(relieved_parts) for _ in parts]
+            cut = neck_length(parts_ids[0], parts_ids[1:], self.graph, len(self.surface.faces)) / self.unit
+            gain = piece.cost(price) - sum(part.cost(price) for part in whole) - price * cut
             if best is None or gain > best[0]:
-                best = gain, parts
+                best = gain, whole
         return best
-
-    def cut(self, ids: list[NDArray[np.int64]], parts: list[Piece | None]) -> Cut | None:
-        """A way to split as it was weighed without slits; None where a part can't be flattened."""
-        whole = [part for part in parts if part is not None]
-        if len(whole) < len(parts):
-            return None
-        price = self.config.relief.price
-        border = price * neck_length(ids[0], ids[1:], self.graph, len(self.surface.faces)) / self.unit
-        return Cut(border + sum(part.cost(price) for part in whole), border, whole)
 
     def search(self, most: int) -> None:
         """Merge down to ``most`` pieces, then split and merge while that pays."""
