@@ -11,10 +11,11 @@ cosine to n (Shirley and Morley 2003).  It is not of unit length.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -43,6 +44,9 @@ TILE = 8
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 Progress = Callable[[int, int], None]
+Found = TypeVar("Found")
+
+_thread = threading.local()
 
 
 @dataclass(frozen=True)
@@ -97,34 +101,55 @@ class RayScene:
         mesh = lagrange.SurfaceMesh()
         mesh.add_vertices(np.ascontiguousarray(frame.apply(surface.vertices), np.float64))
         mesh.add_triangles(np.ascontiguousarray(surface.faces, np.uint32))
-        casting = lagrange.raycasting
-        caster = casting.RayCaster(casting.SceneFlags.Robust, casting.BuildQuality.High)
-        caster.add_mesh(mesh)
-        caster.commit_updates()
-        return cls(frame, caster)
+        return cls(frame, apart(lambda: _caster(mesh)))
 
     def occluded(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32] | None = None
     ) -> NDArray[np.bool_]:
         """(r,) bool: whether anything lies on rays (r, 3), within reach (r,) lengths of their directions."""
-        return self.caster.occluded(origin, direction, None, reach)
+        return apart(lambda: self.caster.occluded(origin, direction, None, reach))
 
     def cast(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32] | None = None
     ) -> Hits:
         """First hits of rays (r, 3), within reach (r,) lengths of their directions."""
-        return _hits(found := self.caster.cast(origin, direction, None, reach), found.ray_depth)
+        return _hits(found := apart(lambda: self.caster.cast(origin, direction, None, reach)), found.ray_depth)
 
     def cast_facing(
         self, origin: NDArray[np.float32], direction: NDArray[np.float32], reach: NDArray[np.float32]
     ) -> tuple[Hits, NDArray[np.bool_]]:
         """As `cast`, and whether each ray (r,) meets the front of the face, the side its normal points to."""
-        found = self.caster.cast(origin, direction, None, reach)
+        found = apart(lambda: self.caster.cast(origin, direction, None, reach))
         return _hits(found, found.ray_depth), np.einsum("ri,ri->r", found.normal, direction) < 0.0
 
     def nearest(self, points: NDArray[np.float32]) -> Hits:
         """Nearest surface points of points (r, 3)."""
-        return _hits(found := self.caster.closest_point(points), found.distance)
+        return _hits(found := apart(lambda: self.caster.closest_point(points)), found.distance)
+
+
+def _caster(mesh: Any) -> Any:
+    casting = lagrange.raycasting
+    caster = casting.RayCaster(casting.SceneFlags.Robust, casting.BuildQuality.High)
+    caster.add_mesh(mesh)
+    caster.commit_updates()
+    return caster
+
+
+def apart(task: Callable[[], Found]) -> Found:
+    """What a task of the library returns, run in a thread that ends with it.
+
+    The library leaves the thread that calls it with denormal numbers flushed to zero, for good; in such a thread
+    scipy's KDTree runs into a segmentation fault.
+    """
+    if getattr(_thread, "expendable", False):
+        return task()
+    with ThreadPoolExecutor(1, initializer=_mark) as pool:
+        return pool.submit(task).result()
+
+
+def _mark() -> None:
+    """This thread is used for rays alone."""
+    _thread.expendable = True
 
 
 def _hits(found: Any, distance: NDArray[np.float32]) -> Hits:
@@ -179,7 +204,7 @@ def in_batches(
 ) -> None:
     """Call work with every piece of at most `size` texels, several at once; stops early when one of them raises."""
     pieces = [texels[start : start + size] for start in range(0, len(texels), size)]
-    pool = ThreadPoolExecutor(WORKERS)
+    pool = ThreadPoolExecutor(WORKERS, initializer=_mark)
     try:
         done = 0
         for piece, _ in zip(pieces, pool.map(work, pieces), strict=True):

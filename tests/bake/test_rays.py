@@ -148,3 +148,13 @@ def test_the_missing_library_is_named_with_its_remedy() -> None:
     last = done.stderr.strip().splitlines()[-1]
     assert "MissingDependencyError: lagrange cannot be imported" in last
     assert "pip install 'flexpara[bake]'" in last
+
+
+def test_rays_leave_denormal_numbers_as_they_are() -> None:
+    scene = RayScene.of(Surface(np.eye(3), np.array([[0, 1, 2]])))
+    points = np.zeros((4, 3), np.float32)
+    scene.occluded(points, points + 1.0)
+    scene.cast(points, points + 1.0)
+    scene.nearest(points)
+    in_batches(lambda _: None, np.arange(4), 1)
+    assert np.float64(5e-324) * 1.0 > 0.0
