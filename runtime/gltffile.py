@@ -113,7 +113,7 @@ def _scene(file: GltfFile) -> RawMesh:
             if faces > MAX_FACES:
                 raise MeshError(f"the glTF scene has over {MAX_FACES} faces; decimate the meshes or split the scene")
     if not parts:
-        found = "points or lines only (point clouds come in a later version)" if skipped else "no mesh"
+        found = "points or lines only (give points as .ply, .xyz or .npy)" if skipped else "no mesh"
         raise MeshError(f"the glTF scene holds {found}, expected triangles; check the export")
     whole = merge(parts)
     whole.changes.update(changes, skipped_primitives=skipped)

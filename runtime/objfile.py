@@ -48,9 +48,7 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
     """
     lines = _split(data)
     if lines.text["v"] and not lines.text["f"]:
-        raise MeshError(
-            "the file holds points and no faces; point clouds come in a later version: give a triangle mesh"
-        )
+        raise MeshError("the file holds points and no faces, expected faces; give points as .ply, .xyz or .npy")
     if not lines.text["f"]:
         raise MeshError(
             "no face in this OBJ file (no line that starts with 'f'), expected a triangle mesh; check the export"

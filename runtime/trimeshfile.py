@@ -106,7 +106,7 @@ def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
     except Exception as error:
         raise MeshError(f"not readable as .{kind} ({_first_line(error)}); export it again") from error
     if not parts:
-        found = "points or lines only (point clouds come in a later version)" if others else "no face"
+        found = "points or lines only (give points as .ply, .xyz or .npy)" if others else "no face"
         raise MeshError(f"the file holds {found}, expected triangles; give a triangle mesh")
     return merge(parts)
 

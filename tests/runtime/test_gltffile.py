@@ -269,7 +269,7 @@ def broken(change: str) -> bytes:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("points only", "point clouds come in a later version"),
+        ("points only", "give points as"),
         ("no mesh", "no mesh"),
         ("huge count", "elements"),
         ("huge zeros", "elements"),
