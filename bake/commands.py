@@ -92,7 +92,17 @@ def bake(
     entries = chosen_maps(outputs.for_asset(asset), high=source, fields=field or [], seed=seed)
     atlas = with_tangents(replace(atlas_from_uv(asset), size=size), entries)
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
-    facts["settings"] = {"maps": [entry.name for entry in entries], "size": size, "padding": options.margin}
+    facts["settings"] = {
+        "maps": [entry.name for entry in entries],
+        "size": size,
+        "padding": options.margin,
+        "samples": samples,
+        "rays": rays,
+        "seed": seed,
+        "target": target,
+        "high": [path.name for path in high or []],
+        "cage": cage,
+    }
     with OutputFolder(output, asset.stem, force=force, source=mesh, report=f"{asset.stem}.bake.json") as folder:
         check_outputs(folder, outputs, entries, meshes=False)
         with progress_bars(quiet=quiet) as progress:
