@@ -38,7 +38,7 @@ CHUNK = 1 << 18
 """Texels interpolated at once: bounds the memory of temporaries."""
 GROWTH = 1.0 / 16.0
 """Texels by which faces are drawn larger: more than any device's rounding of places.  The fragments decide."""
-WINDOW = 1 << 20
+WINDOW = 1 << 22
 """Texels drawn at once: the targets stay in the processor's cache, and their memory is used again."""
 
 
@@ -174,7 +174,8 @@ class DeviceRasterizer:
         self._fresh = True
         self._corners = _corner_texture(context, stack, atlas, layout)
         self._targets = _targets(context, stack, self._width, self._height)
-        self._nothing = np.full((self._height, self._width), -1, np.int32)
+        self._blank = build_program(context, ("blank.vert",), ("blank.frag",))
+        stack.callback(self._blank.release)
         self._interior = _program(context, stack, "interior")
         self._border = _program(context, stack, "border")
         self._interior["growth"] = GROWTH
@@ -192,7 +193,7 @@ class DeviceRasterizer:
             )
         into = Planes.of(window.height, window.width) if planes is None else planes
         with ExitStack() as stack:
-            frame = _cleared_frame(self._context, self._targets, self._nothing, clear=clear or self._fresh)
+            frame = self._cleared_frame(stack, clear=clear or self._fresh)
             self._fresh = False
             with drawing_into(self._context, frame):
                 frame.viewport = (0, 0, window.width, window.height)
@@ -205,6 +206,18 @@ class DeviceRasterizer:
                     _read(frame, attachment, plane)
         check_error(self._context)
         return GBuffer.of(into, window.row, window.column, self.layout.size)
+
+    def _cleared_frame(self, stack: ExitStack, *, clear: bool) -> moderngl.Framebuffer:
+        """Over all targets: depth far, face −1 (drawn: moderngl clears floats only), floats 0 if clear."""
+        *floats, face, depth = self._targets
+        wiped = self._context.framebuffer(color_attachments=floats if clear else [], depth_attachment=depth)
+        with drawing_into(self._context, wiped):
+            wiped.clear(depth=1.0)
+        with drawing_into(self._context, self._context.framebuffer(color_attachments=[face])):
+            array = self._context.vertex_array(self._blank, [])
+            stack.callback(array.release)
+            array.render(moderngl.TRIANGLES, vertices=3)
+        return self._context.framebuffer(color_attachments=[*floats, face], depth_attachment=depth)
 
     def _draw_faces(self, stack: ExitStack, window: Window) -> None:
         """A triangle for each face; two, a rectangle, for needles, whose numbers go down as ~face."""
@@ -268,17 +281,6 @@ def _targets(context: moderngl.Context, stack: ExitStack, width: int, height: in
     for target in targets:
         stack.callback(target.release)
     return targets
-
-
-def _cleared_frame(
-    context: moderngl.Context, targets: list[moderngl.Texture], nothing: NDArray[np.int32], *, clear: bool
-) -> moderngl.Framebuffer:
-    """Over all targets: depth far, face −1 (by upload: moderngl clears floats only), floats 0 if clear."""
-    wiped = context.framebuffer(color_attachments=targets[:2] if clear else [], depth_attachment=targets[3])
-    with drawing_into(context, wiped):
-        wiped.clear(depth=1.0)
-    targets[2].write(nothing)
-    return context.framebuffer(color_attachments=targets[:3], depth_attachment=targets[3])
 
 
 def _program(context: moderngl.Context, stack: ExitStack, name: str) -> moderngl.Program:

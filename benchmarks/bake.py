@@ -1,6 +1,6 @@
-"""The table of flexpara's rays beside bare loops over ray libraries: `python -m benchmarks.bake [MESH]`.
+"""The baker's table, each row beside its peer of the same run: `python -m benchmarks.bake [MESH]`.
 
-Every row stands beside its peer of the same run.  Ambient occlusion: the peer is a loop that only calls the library,
+Ambient occlusion: the peer is a loop that only calls the library,
 with batches made beforehand, the same batches as flexpara's.  High to low: MESH decimated to --faces, unwrapped by
 flexpara, baked; both surfaces are then seen by orthographic cameras along the six axes, and the normals compared,
 those of the low-poly mesh without and with its map.  Angles are in degrees, over pixels that both surfaces cover.
@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.raster import COMMAND_BAR, RATE_BAR, command_seconds, drawing_rates
 from benchmarks.unwrap import ROOT, header, timed
 from flexpara.bake.baker import bake, make_gbuffer
 from flexpara.bake.cage import CageSettings
@@ -47,10 +48,11 @@ if TYPE_CHECKING:
     from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 SHARE_BAR, SECONDS_BAR, ANGLE_BAR = 0.8, 8.0, 2.0
+LARGE = 4096
 SPARSE = 8
 """The bare loops trace every so manieth batch."""
 BANDS = 8
-COLUMNS = ("work", "tool", "seconds", "M rays/s", "× peer", "mean °", "median °", "bar")
+COLUMNS = ("work", "tool", "seconds", "M rays or texels/s", "× peer", "mean °", "median °", "bar")
 
 
 class Row(NamedTuple):
@@ -252,6 +254,18 @@ def decimated(surface: Surface, faces: int, folder: Path, size: int) -> Asset:
     return unwrapped(folder / "low.ply", folder, size)
 
 
+def raster_rows(atlas: Atlas, mesh: Path, folder: Path) -> Iterator[Row]:
+    """Drawing at 4096², beside a bare draw; then the whole command."""
+    rates = drawing_rates(atlas, LARGE)
+    work, met = f"position + normal {LARGE}², drawn and read", "met" if rates.own >= RATE_BAR else "missed"
+    yield Row(work, "moderngl, bare draw", rate=rates.bare)
+    yield Row(work, "flexpara", rate=rates.own, share=rates.own / rates.bare, bar=f"≥ {RATE_BAR:.0f} M/s: {met}")
+    seconds = command_seconds(mesh, folder, LARGE)
+    met = "met" if seconds <= COMMAND_BAR else "missed"
+    work = f"flexpara bake --size {LARGE}, PNG and EXR written"
+    yield Row(work, "flexpara", seconds, bar=f"≤ {COMMAND_BAR:.0f} s: {met}")
+
+
 def unwrapped(path: Path, folder: Path, size: int) -> Asset:
     """The mesh of a file, unwrapped by flexpara's command line."""
     command = ["-m", "flexpara", "unwrap", str(path), "-o", str(folder), "--size", str(size)]
@@ -284,11 +298,13 @@ def main(argv: list[str] | None = None) -> int:
     missed = 0
     with tempfile.TemporaryDirectory() as name:
         folder, source = Path(name), load_asset(given.mesh)
+        full_path = given.high or folder / f"{given.mesh.stem}.glb"
         full = load_asset(given.high) if given.high else unwrapped(given.mesh, folder, given.size)
         low = load_asset(given.low) if given.low else decimated(source.surface, given.faces, folder, given.size)
         rows = occlusion_rows(atlas_from_uv(full), full, given.size, given.rays, given.blender_python)
         more = high_rows(atlas_from_uv(low), low, source, given.size, given.cage, given.blender_python)
-        for table in (rows, more):
+        drawn = raster_rows(atlas_from_uv(full), full_path, folder / "maps")
+        for table in (drawn, rows, more):
             for row in table:
                 print(row.line(), flush=True)
                 missed += row.bar.endswith("missed")
