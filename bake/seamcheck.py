@@ -202,7 +202,7 @@ def _conjugate_gradients(
     system: sparse.csr_matrix, right: NDArray[np.float64], *, steps: int = 200, accuracy: float = 1e-5
 ) -> NDArray[np.float64]:
     """Solve system · x = right for all columns of right (g, c) at once, each to a relative accuracy."""
-    scale = 1.0 / np.asarray(system.diagonal())[:, None]
+    scale = np.reciprocal(np.asarray(system.diagonal(), np.float64))[:, None]
     change, residual = np.zeros_like(right), right.copy()
     ahead = direction = scale * residual
     product = (residual * ahead).sum(axis=0)

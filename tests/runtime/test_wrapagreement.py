@@ -55,7 +55,7 @@ def unit_square() -> tuple[Surface, Atlas]:
     """The unit square of the plane z = 7, which is its own atlas."""
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     surface = Surface(np.concatenate([uv, np.full((4, 1), 7.0)], axis=1), np.array([[0, 1, 2], [0, 2, 3]]))
-    up = np.tile(np.float32([0.0, 0.0, 1.0]), (4, 1))
+    up = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))
     chart, source = np.zeros(2, np.int64), np.arange(4)
     return surface, Atlas(surface.vertices, surface.faces, uv.astype(np.float32), up, chart, source, 64, 1)
 
@@ -69,7 +69,7 @@ class Shifted:
     def wrap(self, uv: np.ndarray, chart: np.ndarray) -> Wrapped:
         assert not chart.any()
         points = np.concatenate([uv, np.full((len(uv), 1), 7.0 + self.shift)], axis=1)
-        normal = np.float32([np.sin(self.angle), 0.0, np.cos(self.angle)])
+        normal = np.array([np.sin(self.angle), 0.0, np.cos(self.angle)], np.float32)
         return Wrapped(points, np.tile(normal, (len(uv), 1)))
 
 
