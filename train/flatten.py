@@ -58,12 +58,15 @@ def mean_distortion(surface: Surface, uv: NDArray[np.float64]) -> float:
 def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]:
     """Bijective uv (v, 2) of a disk: its boundary loop on a circle by arc length, the inside harmonic.
 
-    Cotangent weights first (close to conformal); where they flip a triangle, uniform ones, which can't (Tutte 1963).
-    Scaled to the surface's area.
+    Cotangent weights first (close to conformal); where they flip a triangle or can't be solved for, uniform ones, which
+    flip none (Tutte 1963).  Scaled to the surface's area.
     """
     boundary = np.asarray(igl.map_vertices_to_circle(surface.vertices, loop), dtype=np.float64)
     faces = np.asfortranarray(surface.faces)
-    uv = np.asarray(igl.harmonic(np.asfortranarray(surface.vertices), faces, loop, boundary, 1), dtype=np.float64)
+    try:
+        uv = np.asarray(igl.harmonic(np.asfortranarray(surface.vertices), faces, loop, boundary, 1), dtype=np.float64)
+    except RuntimeError:  # libigl's word for a singular system
+        uv = np.full((len(surface.vertices), 2), np.nan)
     if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
         uv = tutte_map(surface, loop, boundary)
     return uv * np.sqrt(surface.face_areas().sum() / np.pi)
