@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from ..runtime.materials import Picture, Wrap
 
+ROUNDING = 0.01
+"""Powers of 2 by which a footprint may exceed a grid: uv in float32 make texels that are copied one by one uneven."""
 MOST = 8
 """Points along each side of a texel's footprint."""
 SHARPEN = 1.0 / 8.0
@@ -202,9 +204,9 @@ def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: i
 def footprint_grids(axes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """How footprints (f, 2, 2), in source texels, are sampled: points per side (f, 2), powers of 2, and level (f,)."""
     length = np.linalg.norm(axes, axis=2)
-    coarse = np.floor(np.log2(np.maximum(length.min(axis=1), 1.0)) + 1e-9)
+    coarse = np.floor(np.log2(np.maximum(length.min(axis=1), 1.0)) + ROUNDING)
     length = length / np.exp2(coarse)[:, None]
-    wanted = np.ceil(np.log2(np.maximum(length, 1.0)) - 1e-9)
+    wanted = np.ceil(np.log2(np.maximum(length, 1.0)) - ROUNDING)
     counts = np.exp2(np.minimum(wanted, np.log2(MOST))).astype(np.int64)
     spacing = (length / counts).max(axis=1)
     further = np.rint(np.log2(np.maximum(spacing, 1.0)))
