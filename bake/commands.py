@@ -12,7 +12,7 @@ from ..runtime.errors import InputError
 from ..runtime.extras import requires
 from ..runtime.options import Options, Outputs
 from ..runtime.progress import Clock, progress_bars
-from .output import check_outputs, chosen_maps, padding_of, texture_facts, with_tangents, write_textures
+from .output import bleeding, check_outputs, chosen_maps, padding_of, texture_facts, with_tangents, write_textures
 
 if TYPE_CHECKING:
     from .highmaps import HighSource
@@ -34,6 +34,8 @@ def bake(
     target: str | None = None,
     udim: Flag = False,
     layers: Flag = False,
+    exr_bits: Literal[16, 32] = 32,
+    exr_compression: str = "zip",
     texture_format: Literal["png", "exr"] | None = None,
     normal_format: Literal["opengl", "directx"] = "opengl",
     seed: int = 0,
@@ -61,6 +63,8 @@ def bake(
         target: gltf, unreal, unity, godot, blender or usd: file names, packing, depth, green channel and padding
         udim: uv beyond the unit square become further images, STEM_MAP.1001.png and so on
         layers: all maps as layers of STEM.exr
+        exr_bits: of that file's channels: 16 (half) or 32 (float)
+        exr_compression: of that file: zip, zips, piz, rle, none, …
         texture_format: of all maps that can be stored so (default: each map's own)
         normal_format: green channel of the normal map: opengl (+Y) or directx (-Y)
         seed: of the rays
@@ -75,6 +79,8 @@ def bake(
         normal_format=normal_format,
         target=target,
         layers=layers,
+        exr_bits=exr_bits,
+        exr_compression=exr_compression,
         samples=samples,
         rays=rays,
     )
@@ -115,6 +121,7 @@ def bake(
             else:
                 baked = write_textures(folder, atlas, asset, outputs, entries, options.margin, Clock(progress))
                 facts["textures"] = texture_facts(atlas, baked)
+                facts["textures"]["bleed_free_mip"] = bleeding(atlas, size, options.margin)
         facts |= {} if source is None else {"high": source.report()}
         folder.write_report(facts)
         written = folder.commit()

@@ -10,7 +10,7 @@ import warnings
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ..runtime.errors import MissingDependencyError
 from ..runtime.extras import requires
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas
     from ..runtime.options import Outputs
     from ..runtime.progress import Clock
+    from .exr import ExrSettings
     from .highmaps import HighSource
     from .images import Texture
     from .maps import BakeMap
@@ -105,6 +106,7 @@ def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list
     if not maps:
         return []
     if outputs.layers:
+        exr_settings(outputs)
         return [f"{stem}.exr"]
     if outputs.target is None:
         from .baker import texture_names
@@ -179,8 +181,8 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
     if outputs.layers:
         from .exr import file_metadata, write_layers
 
-        metadata = file_metadata(asset, normal_format=outputs.normal_format)
-        output.write(f"{stem}.exr", lambda path: write_layers(textures, path, metadata=metadata))
+        settings, metadata = exr_settings(outputs), file_metadata(asset, normal_format=outputs.normal_format)
+        output.write(f"{stem}.exr", lambda path: write_layers(textures, path, settings, metadata=metadata))
         return dict.fromkeys(textures, f"{stem}.exr")
     if outputs.target is not None:
         from .targets import find_target, write_target
@@ -198,6 +200,13 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
     kind = outputs.texture_format
     output.write_several(lambda folder: write_each(textures, folder, stem, file_type=kind))
     return texture_names(textures, stem, file_type=kind)
+
+
+def exr_settings(outputs: Outputs) -> ExrSettings:
+    """How layers are stored.  Raises: EncodingError for a compression that OpenEXR has not."""
+    from .exr import ExrSettings
+
+    return ExrSettings(outputs.exr_bits, cast("Any", outputs.exr_compression))
 
 
 def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
@@ -236,6 +245,14 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
     from .seamcheck import seam_report
 
     return {"files": baked.files, "seam_error": seam_report(atlas, baked.textures)}
+
+
+def bleeding(atlas: Atlas, size: int, padding: int) -> int:
+    """The highest mip level of such textures at which no chart takes in another's texels."""
+    from .baker import chart_labels
+    from .seamcheck import bleed_free_mip
+
+    return bleed_free_mip(chart_labels(atlas, size, padding), atlas)
 
 
 def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:

@@ -87,7 +87,7 @@ class Outputs:
     normal_format: green channel of the normal map, "opengl" (+Y) or "directx" (−Y).
     inverse: whether the inverse map, `<stem>.wrap.onnx`, is made.
     target: engine preset of file names, packing, depth and green channel; None is flexpara's own.
-    layers: all maps as layers of one EXR file.
+    layers: all maps as layers of one EXR file, of 16 (half) or 32 bits (float) and OpenEXR's compression.
     samples: per texel: 1, 4 or 16.  rays: per sample of ray-traced maps, 1 to 4096.
 
     Raises: InputError for an unknown format.
@@ -101,6 +101,8 @@ class Outputs:
     inverse: bool = False
     target: str | None = None
     layers: bool = False
+    exr_bits: Literal[16, 32] = 32
+    exr_compression: str = "zip"
     samples: int = 1
     rays: int = 64
 

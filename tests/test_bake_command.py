@@ -1,0 +1,82 @@
+"""`flexpara bake` from its words to its files: engine targets, layers, UDIM, high-poly meshes."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from flexpara.__main__ import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytest.importorskip("moderngl")
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    """A unit square that is its own uv."""
+    path = tmp_path / "square.obj"
+    path.write_text(SQUARE, encoding="utf-8")
+    return path
+
+
+def baked(mesh: Path, *words: str) -> tuple[set[str], dict[str, Any]]:
+    """The files of a bake at 32², without its report, and that report."""
+    out = mesh.parent / "out"
+    assert main(["bake", str(mesh), "-o", str(out), "--size", "32", "--quiet", *words]) == 0
+    report = json.loads((out / "square.bake.json").read_text(encoding="utf-8"))
+    return {path.name for path in out.iterdir()} - {"square.bake.json"}, report
+
+
+def test_a_target_names_its_files(square: Path) -> None:
+    files, report = baked(square, "--maps", "normal,ao", "--rays", "4", "--target", "unreal")
+    assert files == {"T_square_N.png", "T_square_ORM.png"}
+    assert report["settings"]["target"] == "unreal"
+    assert report["settings"]["rays"] == 4
+
+
+def test_layers_share_one_file(square: Path) -> None:
+    files, report = baked(square, "--maps", "normal,position", "--layers", "--exr-bits", "16")
+    assert files == {"square.exr"}
+    assert report["textures"]["bleed_free_mip"] >= 0
+
+
+def test_udim_gives_an_image_for_each_square(square: Path) -> None:
+    square.write_text(SQUARE.replace("vt 1 ", "vt 2 "), encoding="utf-8")
+    files, report = baked(square, "--maps", "position", "--udim")
+    assert files == {"square_position.1001.exr", "square_position.1002.exr"}
+    assert report["tiles"] == [1001, 1002]
+
+
+def test_a_high_poly_mesh_gives_the_height(square: Path) -> None:
+    high = square.with_name("high.obj")
+    high.write_text("v -1 -1 .01\nv 2 -1 .01\nv 2 2 .01\nv -1 2 .01\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    _, report = baked(square, "--maps", "height", "--high", str(high), "--cage", "0.05")
+    assert report["high"]["missed"] == 0
+    assert report["high"]["highest"] == pytest.approx(0.01, abs=1e-6)
+    assert report["high"]["lowest"] == 0.0  # nothing lies behind the low-poly mesh
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--target", "cryengine"],
+        ["--udim", "--layers"],
+        ["--rays", "0"],
+        ["--samples", "3"],
+        ["--layers", "--exr-compression", "jpeg"],
+        ["--maps", "height"],
+        ["--high", "absent.obj"],
+    ],
+)
+def test_what_cannot_be_done_ends_with_2_and_leaves_nothing(
+    words: list[str], square: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = square.parent / "out"
+    assert main(["bake", str(square), "-o", str(out), "--size", "32", "--quiet", *words]) == 2
+    assert "error:" in capsys.readouterr().err
+    assert not out.exists() or not list(out.iterdir())
