@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from ..runtime.errors import MissingDependencyError
+from ..runtime.errors import InputError, MissingDependencyError
 from ..runtime.extras import requires
 
 if TYPE_CHECKING:
@@ -76,6 +76,8 @@ def check_outputs(
 
     Raises: InputError, ForeignFileError, MissingDependencyError.
     """
+    if meshes and "usda" in outputs.formats:
+        check_green(outputs)
     names = [*possible_files(output.stem, outputs, maps), *more]
     if meshes:
         endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
@@ -86,6 +88,15 @@ def check_outputs(
     with requires("bake"):
         for module in (name for name, needed in wanted.items() if needed):
             import_module(f".{module}", __package__)
+
+
+def check_green(outputs: Outputs) -> None:
+    """USD reads +Y, and a usda file names the normal map beside it.  Raises: InputError where that is −Y."""
+    with requires("bake"):
+        from .targets import find_target
+    green = outputs.normal_format if outputs.target is None else find_target(outputs.target).green
+    if green != "opengl":
+        raise InputError(f"format usda beside {green} normal maps, expected opengl; leave usda or that choice out")
 
 
 def padding_of(padding: int | None, target: str | None, size: int) -> int | None:

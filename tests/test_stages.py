@@ -81,3 +81,17 @@ def test_a_run_that_is_cut_short_is_resumed_with_its_own_options(
 def test_nothing_to_resume_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["unwrap", "--resume", str(tmp_path)]) == 2
     assert "no run to resume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("green", [["--target", "unreal"], ["--normal-format", "directx"]])
+def test_usd_does_not_name_normal_maps_that_point_the_other_way(
+    green: list[str],
+    square: Path,
+    tmp_path: Path,
+    instant_training: list[Surface],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    argv = ["unwrap", str(square), "-o", str(tmp_path / "out"), "--format", "usda", "--size", "64", *green, *QUIET]
+    assert main(argv) == 2
+    assert "expected opengl" in capsys.readouterr().err
+    assert instant_training == []
