@@ -15,7 +15,7 @@ from torch import Tensor
 
 from ..losses import cosine_gap, position_gap, weighted_mean
 from .losses import box_side, edge_gap, edge_score, eigenvalue_gap, nearest_gap, repulsion
-from .neighbours import Neighbourhood, own_neighbours
+from .neighbours import Neighbourhood, chart_neighbours
 
 if TYPE_CHECKING:
     from .batches import Batch
@@ -47,7 +47,7 @@ def chart_terms(networks: MultiChartPaperNetworks, batch: Batch, config: PaperCo
         cycle, slopes = jet[0], jet[1:, ..., :3]
     else:
         cycle, slopes = networks.fold(uv, dtype), None
-    near = torch.stack([own_neighbours(flat, config.neighbours) for flat in uv.unbind()])
+    near = chart_neighbours(uv, config.neighbours)
     repelled = repulsion(uv, near, chart_epsilon(uv, score, len(batch.all_xyz), config), score)
     total = position_gap(cycle[..., :3], batch.xyz)
     if batch.normal is not None:

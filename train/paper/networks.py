@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from torch import Tensor, nn
@@ -43,17 +43,45 @@ class Affine(Dense):
 
     def run(self, x: Tensor, dtype: torch.dtype) -> Tensor:
         """(…, n, c_in) → (…, n, c_out) in ``dtype``, bias included in the product."""
+        if x.dtype == torch.bfloat16 != dtype:
+            return ExactProduct.apply(x, self.weight) + self.bias
         x, weight = in_precision(x, self.weight, dtype)
         bias = self.bias.to(dtype)
         if weight.ndim == 2:
             return torch.addmm(bias, x, weight) if x.ndim == 2 else x @ weight + bias
+        if x.ndim == 2:  # as one wide product: its gradients need neither p copies of x nor a sum over them
+            wide = weight.transpose(0, 1).reshape(x.shape[1], -1)
+            every = torch.addmm(bias.reshape(1, -1), x, wide)
+            return every.view(len(x), len(weight), -1).transpose(0, 1).contiguous()
         return torch.baddbmm(bias, x.expand(weight.shape[0], -1, -1), weight)
 
     def run_jet(self, x: Tensor, dtype: torch.dtype) -> Tensor:
         """The same on jets (3, …, n, c): only the value gets the bias."""
         x, weight = in_precision(x, self.weight, dtype)
         bias = self.bias.to(dtype)
-        return x @ weight + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+        product = ExactProduct.apply(x, weight) if x.dtype == torch.bfloat16 != dtype else x @ weight
+        return product + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+
+
+class ExactProduct(torch.autograd.Function):
+    """bfloat16 features x (…, n, c_in) times a float32 weight (…, c_in, c_out), in float32: what makes coordinates.
+
+    Gradients go back in the features' own bfloat16, as in the layers before; in float32 they would be slow.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, weight: Tensor) -> Tensor:
+        """Product in float32."""
+        ctx.save_for_backward(x, weight)
+        return x.float() @ weight
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor]:
+        """Of x in bfloat16, of weight in float32."""
+        x, weight = ctx.saved_tensors
+        gradient = gradients[0].to(x.dtype)
+        of_weight = (x.mT @ gradient).float()
+        return gradient @ weight.to(x.dtype).mT, of_weight.sum_to_size(weight.shape)
 
 
 def in_precision(x: Tensor, weight: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
@@ -150,8 +178,12 @@ def in_blocks(function: Callable[[Tensor], tuple[Tensor, ...]], x: Tensor, rows:
     """
     if x.device.type != "cpu":
         return function(x)
-    blocks = [function(part) for part in x.split(max(1, BLOCK // rows), dim=-2)]
-    return tuple(torch.cat(parts, dim=-2) for parts in zip(*blocks, strict=True))
+    total = x.shape[-2]
+    blocks = math.ceil(total * rows / BLOCK)
+    missing = -total % blocks
+    padded = torch.cat([x, x[..., total - missing :, :]], dim=-2) if missing else x
+    done = [function(part) for part in padded.chunk(blocks, dim=-2)]
+    return tuple(torch.cat(parts, dim=-2)[..., :total, :] for parts in zip(*done, strict=True))
 
 
 def plane_jet(uv: Tensor) -> Tensor:

@@ -1,7 +1,10 @@
 """AdamW with a half-cosine rate, all parameters as one vector, and a state that can be saved.
 
-torch.optim would do, but its first use imports torch's compiler, and its state is not plain tensors.
+torch.optim would do, but its first use imports torch's compiler, and its state is not plain tensors.  Like torch.optim
+it is written with torch's _foreach functions, which take all parameters at once and are not declared public.
 """
+
+# pyright: reportPrivateImportUsage=false
 
 from __future__ import annotations
 
@@ -32,26 +35,37 @@ class CosineAdamW:
 
     def __init__(self, module: nn.Module, config: PaperConfig) -> None:
         self._parameters: list[Tensor] = list(module.parameters())
-        self._sizes = [parameter.numel() for parameter in self._parameters]
         self._config = config
-        device = self._parameters[0].device
-        self.mean = torch.zeros(sum(self._sizes), device=device)
-        self.square = torch.zeros(sum(self._sizes), device=device)
+        device, sizes = self._parameters[0].device, [own.numel() for own in self._parameters]
+        self.mean = torch.zeros(sum(sizes), device=device)
+        self.square = torch.zeros(sum(sizes), device=device)
+        self._means = _views(self.mean, self._parameters)
+        self._squares = _views(self.square, self._parameters)
         self.taken = 0
 
     def step(self, loss: Tensor) -> None:
-        """One step down the gradient of a scalar loss; parameters it doesn't depend on only decay."""
+        """One step down the gradient of a scalar loss; parameters it doesn't depend on only decay.
+
+        Parameter by parameter: passes over whole vectors of the paper's nine million would each ask the system for
+        fresh memory.
+        """
         gradients = torch.autograd.grad(loss, self._parameters, materialize_grads=True)
         config = self._config
         rate = cosine_rate(self.taken, config.steps, config.rate, config.final_rate) * config.rate_factor
         self.taken += 1
         first, second = (1.0 - beta**self.taken for beta in BETAS)
         with torch.no_grad():
-            gradient = torch.cat([part.reshape(-1) for part in gradients])
-            self.mean.lerp_(gradient, 1.0 - BETAS[0])
-            self.square.mul_(BETAS[1]).addcmul_(gradient, gradient, value=1.0 - BETAS[1])
-            root = self.square.sqrt().div_(math.sqrt(second)).add_(EPSILON)
-            change = (self.mean / root).mul_(-rate / first)
-            parts = [part.view_as(own) for part, own in zip(change.split(self._sizes), self._parameters, strict=True)]
-            torch._foreach_mul_(self._parameters, 1.0 - rate * config.decay)  # pyright: ignore[reportPrivateImportUsage]
-            torch._foreach_add_(self._parameters, parts)  # pyright: ignore[reportPrivateImportUsage]
+            torch._foreach_lerp_(self._means, gradients, 1.0 - BETAS[0])
+            torch._foreach_mul_(self._squares, BETAS[1])
+            torch._foreach_addcmul_(self._squares, gradients, gradients, value=1.0 - BETAS[1])
+            roots = torch._foreach_sqrt(self._squares)
+            torch._foreach_div_(roots, math.sqrt(second))
+            torch._foreach_add_(roots, EPSILON)
+            torch._foreach_mul_(self._parameters, 1.0 - rate * config.decay)
+            torch._foreach_addcdiv_(self._parameters, self._means, roots, value=-rate / first)
+
+
+def _views(moment: Tensor, parameters: list[Tensor]) -> list[Tensor]:
+    """The parts of a flat moment that belong to each parameter, in its shape and on the same memory."""
+    parts = moment.split([own.numel() for own in parameters])
+    return [part.view_as(own) for part, own in zip(parts, parameters, strict=True)]

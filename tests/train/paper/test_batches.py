@@ -13,7 +13,7 @@ from flexpara.runtime.samples import make_sample
 from flexpara.train.paper.batches import BatchSource, PaperInput, cloud_edges
 from flexpara.train.paper.config import PaperConfig
 from flexpara.train.paper.losses import corner_angles
-from flexpara.train.paper.neighbours import Neighbourhood, _by_blocks, own_neighbours
+from flexpara.train.paper.neighbours import Neighbourhood, _by_blocks, chart_neighbours, own_neighbours
 
 CPU = torch.device("cpu")
 CONFIG = PaperConfig(points=100, device="cpu")
@@ -107,6 +107,10 @@ def test_neighbours_are_those_of_all_distances() -> None:
     expected = distance.topk(6, largest=False).indices[:, 1:]
     assert torch.equal(own_neighbours(points, 5), expected)
     assert torch.equal(_by_blocks(points, points, 6)[:, 1:], expected)
+    charts = points.view(4, 50, 2)
+    each = torch.stack([own_neighbours(chart, 5) for chart in charts])
+    assert torch.equal(chart_neighbours(charts, 5), each)
+    assert torch.equal(_by_blocks(charts, charts, 6)[..., 1:], each)
     assert torch.equal(Neighbourhood(points).nearest(points[:7], 1)[:, 0], torch.arange(7))
 
 

@@ -156,6 +156,32 @@ def test_bfloat16_changes_the_maps_by_less_than_a_hundredth() -> None:
     assert jet.dtype == torch.float32
 
 
+def test_bfloat16_changes_gradients_by_less_than_a_twentieth() -> None:
+    single = GlobalNetworks(PaperNets(hidden=128), generator=generator())
+    several = MultiChartPaperNetworks(3, PaperNets(hidden=128), generator=generator())
+    xyz, uv = noise(200, 3).float(), noise(3, 200, 2).float()
+    maps: list[tuple[nn.Module, Callable[[torch.dtype], Tensor]]] = [
+        (single, lambda dtype: single.flatten(xyz, dtype)),
+        (single, lambda dtype: single.fold_jet(uv[0], dtype)),
+        (several, lambda dtype: several.flatten(xyz, dtype)[1]),
+        (several, lambda dtype: several.fold_jet(uv, dtype)),
+    ]
+    for networks, made in maps:
+        parameters = list(networks.parameters())
+        exact, rounded = (
+            torch.cat(
+                [
+                    part.flatten()
+                    for part in torch.autograd.grad((made(dtype) ** 2).sum(), parameters, allow_unused=True)
+                    if part is not None
+                ]
+            )
+            for dtype in (torch.float32, torch.bfloat16)
+        )
+        assert rounded.dtype == torch.float32
+        assert 0.0 < (exact - rounded).norm() < 0.05 * exact.norm()
+
+
 def test_blocks_of_points_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     single = GlobalNetworks(SMALL, generator=generator()).double()
     several = MultiChartPaperNetworks(3, SMALL, generator=generator(), bidirectional=True).double()

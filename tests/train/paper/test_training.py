@@ -5,11 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pytest
 import torch
+from torch._subclasses.fake_tensor import FakeTensorMode
 
 from flexpara.runtime.errors import FlexparaError, InputError
 from flexpara.runtime.mesh import Frame, Surface
@@ -247,3 +248,33 @@ def test_bfloat16_trains_too(config: PaperConfig) -> None:
     config = replace(config, dtype="bfloat16", steps=60)
     train_paper(surface_input("tube", 16), config, lambda _, loss: losses.append(loss))
     assert losses[-1] < losses[0]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
+@pytest.mark.parametrize("points", [120, 1000], ids=["drawn batches", "whole input"])
+def test_a_step_keeps_to_its_device(
+    config: PaperConfig, points: int, dtype: Literal["float32", "bfloat16"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No CUDA here: torch's device "meta" computes shapes only, and fake tensors refuse to mix it with the CPU."""
+    monkeypatch.setattr("flexpara.train.paper.neighbours._finite", lambda points: points)  # asks for values
+    extras = Ablation(chart_bidirectional=True, chart_differential=True)
+    config = replace(config, points=points, dtype=dtype, ablation=extras)
+    device, generator = torch.device("meta"), torch.Generator().manual_seed(0)
+    networks = training.make_networks(config, generator).to(device)
+    batch = BatchSource(surface_input("tube", 16), config, device).draw(generator)
+    terms = global_terms if config.mode == "global" else chart_terms
+    with FakeTensorMode(allow_non_fake_inputs=True):
+        loss = torch.stack(list(terms(networks, batch, config).values())).sum()  # pyright: ignore[reportArgumentType]
+        gradients = torch.autograd.grad(loss, list(networks.parameters()), allow_unused=True)
+    assert {gradient.device for gradient in gradients if gradient is not None} == {device}
+
+
+@pytest.mark.filterwarnings("ignore:.*should not be instantiated:DeprecationWarning")  # torch 2.13 of itself
+@pytest.mark.parametrize("name", ["flatten", "fold", "fold_jet"])
+def test_the_maps_can_be_compiled_whole(config: PaperConfig, name: str) -> None:
+    networks = training.make_networks(config, torch.Generator().manual_seed(0))
+    charts = () if config.mode == "global" else (config.charts,)
+    x = torch.rand(*(() if name == "flatten" else charts), 50, 3 if name == "flatten" else 2)
+    plain = getattr(networks, name)
+    whole = torch.compile(plain, dynamic=False, fullgraph=True, backend="aot_eager")
+    torch.testing.assert_close(whole(x, torch.bfloat16), plain(x, torch.bfloat16))
