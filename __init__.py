@@ -68,6 +68,7 @@ def unwrap(
     mode: str = "multi-chart",
     steps: int | None = None,
     width: int | None = None,
+    points: int | None = None,
     precision: str = "float32",
     ablation: Sequence[str] = (),
     progress: Progress | None = None,
@@ -85,6 +86,7 @@ def unwrap(
         mode: of preset paper: "multi-chart" or "global", one chart.
         steps: of preset paper; None as published (10,000).
         width: channels of its hidden layers; None as published (512).
+        points: of the surface, in each of its steps; None is 4900.  Fewer are faster.
         precision: of its products: "float32" or "bfloat16".
         ablation: parts of its losses left out or added, see runtime.options.ABLATIONS.
         progress: called as progress(stage, step, steps, loss); loss is None outside training.
@@ -97,7 +99,7 @@ def unwrap(
     from .runtime.cloud import PointCloud
     from .runtime.options import Options
 
-    options = Options(charts, size, padding, seed, preset, mode, steps, width, precision, tuple(ablation))
+    options = Options(charts, size, padding, seed, preset, mode, steps, width, points, precision, tuple(ablation))
     source = load_any(mesh)
     if isinstance(source, PointCloud):
         return unwrap_cloud(source, options, progress)

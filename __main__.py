@@ -84,6 +84,7 @@ def unwrap(
     mode: str = "multi-chart",
     steps: int | None = None,
     width: int | None = None,
+    points: int | None = None,
     precision: str = "float32",
     ablation: str = "none",
     checkpoint_every: int | None = None,
@@ -114,6 +115,7 @@ def unwrap(
         mode: of preset paper: multi-chart or global (one chart)
         steps: of preset paper (default: 10000)
         width: channels of its hidden layers (default: 512)
+        points: of the surface, in each of its steps (default: 4900); fewer is faster
         precision: of its products: float32 or bfloat16
         ablation: its parts left out or added, comma-separated: no-triangle, no-differential, no-upper, no-lower;
             bidirectional, chart-differential
@@ -130,7 +132,7 @@ def unwrap(
         missing = "--mesh" if mesh is None else "--output"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
     margin = padding_of(padding, target, size)
-    options = Options(charts, size, margin, seed, preset, mode, steps, width, precision, names(ablation))
+    options = Options(charts, size, margin, seed, preset, mode, steps, width, points, precision, names(ablation))
     kinds = texture_format, normal_format
     drawn = bool(names(maps)) if preview is None else preview
     outputs = Outputs(names(maps), names(format), drawn, *kinds, inverse, target, samples=samples, rays=rays)
@@ -173,6 +175,7 @@ def train(
     mode: str = "multi-chart",
     steps: int | None = None,
     width: int | None = None,
+    points: int | None = None,
     precision: str = "float32",
     ablation: str = "none",
     quiet: Flag = False,
@@ -189,6 +192,7 @@ def train(
         mode: of preset paper: multi-chart or global (one chart)
         steps: of preset paper (default: 10000)
         width: channels of its hidden layers (default: 512)
+        points: of the surface, in each of its steps (default: 4900); fewer is faster
         precision: of its products: float32 or bfloat16
         ablation: its parts left out or added, see unwrap
         quiet: no progress, no summary
@@ -201,6 +205,7 @@ def train(
         mode=mode,
         steps=steps,
         width=width,
+        points=points,
         precision=precision,
         ablation=names(ablation),
     )

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 PACKAGES = {"libigl": "igl"}
 """Distribution → module, beyond those that `header` lists."""
-GIVEN = ("preset", "charts", "seed", "steps", "width", "precision")
+GIVEN = ("preset", "charts", "seed", "steps", "width", "points", "precision")
 """Options of flexpara that go to it as they are."""
 DEVICE = "import torch; print(torch.cuda.get_device_name() if torch.cuda.is_available() else 'cpu')"
 
@@ -162,6 +162,7 @@ def with_common_options(parser: argparse.ArgumentParser) -> argparse.ArgumentPar
     parser.add_argument("--charts", type=int, default=8)
     parser.add_argument("--steps", type=int, help="flexpara's training steps, instead of the preset's")
     parser.add_argument("--width", type=int, help="channels of preset paper's hidden layers, instead of the paper's")
+    parser.add_argument("--points", type=int, help="of the surface, in each step of preset paper")
     parser.add_argument("--precision", default="float32", help="of preset paper: float32 or bfloat16")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(

@@ -64,6 +64,7 @@ class Job:
     seed: int = 0
     steps: int | None = None
     width: int | None = None
+    points: int | None = None
     precision: str = "float32"
     ablation: str = ""
     python: str = sys.executable
@@ -96,7 +97,7 @@ def by_flexpara(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -
     import flexpara
 
     wanted: dict[str, Any] = {"charts": job.charts, "seed": job.seed, "preset": job.preset, "mode": job.mode}
-    wanted |= {"steps": job.steps, "width": job.width, "precision": job.precision}
+    wanted |= {"steps": job.steps, "width": job.width, "points": job.points, "precision": job.precision}
     wanted |= {"ablation": (job.ablation,) if job.ablation else ()}
     start = time.perf_counter()
     result = flexpara.unwrap((surface.vertices, surface.faces), **wanted)

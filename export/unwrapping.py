@@ -125,6 +125,7 @@ def paper_config(options: Options) -> PaperConfig:
         charts=options.charts,
         seed=options.seed,
         steps=options.steps or plain.steps,
+        points=options.points or plain.points,
         dtype=options.precision,
         nets=replace(plain.nets, hidden=options.width or plain.nets.hidden),
         ablation=Ablation(

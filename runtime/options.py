@@ -18,6 +18,8 @@ ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirect
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "obj", "ply", "usda")
 LARGEST_SEED = 2**32 - 1
+MOST = {"steps": 99_999_999, "width": 8192, "points": 1_000_000}
+"""Of preset paper."""
 AUTO = "auto"
 
 
@@ -30,8 +32,8 @@ class Options:
     seed: 0 to 2³² − 1.
     preset: "fast" is seconds on a CPU; "paper" trains as published, which wants a GPU.
     What follows is for preset "paper" alone.  mode: "global" (one chart) or "multi-chart".  steps: optimizer steps,
-    None as published (10,000).  width: channels of hidden layers, None as published (512).  precision: "float32" or
-    "bfloat16".  ablation: names out of ABLATIONS.
+    None as published (10,000).  width: channels of hidden layers, None as published (512).  points: of the surface, in
+    each step, 16 to 1,000,000; None is 4900.  precision: "float32" or "bfloat16".  ablation: names out of ABLATIONS.
 
     Raises: InputError for a value outside these.
     """
@@ -44,6 +46,7 @@ class Options:
     mode: str = "multi-chart"
     steps: int | None = None
     width: int | None = None
+    points: int | None = None
     precision: str = "float32"
     ablation: tuple[str, ...] = ()
 
@@ -63,10 +66,11 @@ class Options:
             _demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
         for name in self.ablation:
             _demand(name in ABLATIONS, f"ablation is {name!r}, expected some of {', '.join(ABLATIONS)}; correct it")
-        for name in ("steps", "width"):
+        for name, least in (("steps", 1), ("width", 1), ("points", 16)):
             value = getattr(self, name)
-            _demand(value is None or value >= 1, f"{name} is {value}, expected 1 or more; leave --{name} out")
-        for name in ("mode", "steps", "width", "precision", "ablation"):
+            fits = value is None or least <= value <= MOST[name]
+            _demand(fits, f"{name} is {value}, expected {least} to {MOST[name]}; leave --{name} out")
+        for name in ("mode", "steps", "width", "points", "precision", "ablation"):
             value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
             found = f"{name} is {value!r}, expected {default!r} with preset {self.preset}"
             _demand(self.preset == "paper" or value == default, f"{found}; add --preset paper, or leave it out")

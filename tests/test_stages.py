@@ -71,7 +71,8 @@ def test_a_run_that_is_cut_short_is_resumed_with_its_own_options(
 
     monkeypatch.setattr(cli, "unwrap_asset", interrupted)
     out = tmp_path / "out"
-    paper = ["--preset", "paper", "--mode", "global", "--steps", "9", "--width", "16", "--checkpoint-every", "4"]
+    paper = ["--preset", "paper", "--mode", "global", "--steps", "9", "--width", "16", "--points", "64"]
+    paper += ["--checkpoint-every", "4"]
     assert main(["unwrap", str(square), "-o", str(out), "--maps", "none", *paper, *QUIET]) == 130
     assert main(["unwrap", "--resume", str(out), "--quiet"]) == 130
     assert seen[0] == seen[1]
