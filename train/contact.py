@@ -13,9 +13,10 @@ import numpy as np
 
 from ..runtime.overlap import overlapping_pairs
 from ..runtime.topology import edge_table
-from .flatten import Pins, Slim, jacobians, slim, symmetric_dirichlet
+from .flatten import ISOMETRIC, Pins, Slim, jacobians, slim, symmetric_dirichlet
 
 if TYPE_CHECKING:
+    import igl
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Surface
@@ -100,7 +101,13 @@ def rim_overlaps(faces: NDArray[np.int64], edges: NDArray[np.int64], uv: NDArray
     return len(overlapping_pairs(uv[rim])) > 0
 
 
-def separate(surface: Surface, start: Relaxed, edges: NDArray[np.int64], config: ContactConfig) -> Relaxed | None:
+def separate(
+    surface: Surface,
+    start: Relaxed,
+    edges: NDArray[np.int64],
+    config: ContactConfig,
+    energy: igl.MappingEnergyType = ISOMETRIC,
+) -> Relaxed | None:
     """``start`` with its overlaps taken apart; None where ``config.rounds`` did not suffice."""
     margin = config.margin * float(np.sqrt(surface.face_areas().sum()))
     uv, places = start.uv, dict(start.pins)
@@ -112,7 +119,7 @@ def separate(surface: Surface, start: Relaxed, edges: NDArray[np.int64], config:
         if len(buried) == 0 or len(buried) > config.most * len(edges):
             return None
         places.update(zip(buried.tolist(), nearest_exit(uv, buried, edges, margin), strict=True))
-        uv = slim(surface, uv, config.iterations, as_pins(places, config.weight))
+        uv = slim(surface, uv, config.iterations, as_pins(places, config.weight), energy)
     return None if rim_overlaps(surface.faces, edges, uv) else Relaxed(uv, places)
 
 

@@ -92,17 +92,28 @@ def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.fl
     return uv
 
 
-class Slim:
-    """SLIM (Rabinovich et al. 2017) on one piece, symmetric Dirichlet energy, free boundary; libigl does the work."""
+ISOMETRIC = igl.MappingEnergyType.SYMMETRIC_DIRICHLET
+CONFORMAL = igl.MappingEnergyType.CONFORMAL
+"""Energies of SLIM; conformal leaves the scale open."""
 
-    def __init__(self, surface: Surface, uv: NDArray[np.float64], pins: Pins | None = None) -> None:
+
+class Slim:
+    """SLIM (Rabinovich et al. 2017) on one piece, free boundary; libigl does the work."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        uv: NDArray[np.float64],
+        pins: Pins | None = None,
+        energy: igl.MappingEnergyType = ISOMETRIC,
+    ) -> None:
         """``uv`` (v, 2) without flips: SLIM keeps it so.  Pinned vertices are drawn to their places, not forced."""
         pins = pins or Pins(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), 0.0)
         self._data = igl.slim_precompute(
             np.asfortranarray(surface.vertices),
             np.asfortranarray(surface.faces.astype(np.int32)),
             np.asfortranarray(uv),
-            igl.MappingEnergyType.SYMMETRIC_DIRICHLET,
+            energy,
             pins.vertex.astype(np.int32),
             np.asfortranarray(pins.place),
             pins.weight,
@@ -113,9 +124,15 @@ class Slim:
         return np.ascontiguousarray(igl.slim_solve(self._data, iterations))
 
 
-def slim(surface: Surface, uv: NDArray[np.float64], iterations: int, pins: Pins | None = None) -> NDArray[np.float64]:
-    """Uv (v, 2) after ``iterations`` of SLIM from the flip-free ``uv``, at the scale of the surface."""
-    return Slim(surface, uv, pins).run(iterations)
+def slim(
+    surface: Surface,
+    uv: NDArray[np.float64],
+    iterations: int,
+    pins: Pins | None = None,
+    energy: igl.MappingEnergyType = ISOMETRIC,
+) -> NDArray[np.float64]:
+    """Uv (v, 2) after ``iterations`` of SLIM from the flip-free ``uv``; isometric energy has the surface's scale."""
+    return Slim(surface, uv, pins, energy).run(iterations)
 
 
 def fill_holes(surface: Surface, loops: list[NDArray[np.int64]]) -> Surface:

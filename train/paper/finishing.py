@@ -2,9 +2,9 @@
 
 Valid means: no flipped triangle, no overlap, by exact tests.  Each component is opened along its learned seam, slit
 where a disk cannot carry it without stretch (slits lie inside the chart, and are found on a simplified twin), and
-flattened: from the network's own uv where those are valid once the band is laid out anew, else from the circle.
-SLIM lowers the symmetric Dirichlet energy, contacts hold apart what would overlap, and a few last steps of conformal
-energy trade a little area for angles, which is what the paper's global losses ask for.
+flattened: from the network's own uv where those are valid once the band is laid out anew, or from the circle.
+Conformal energy spreads that out, SLIM lowers the symmetric Dirichlet energy, contacts hold apart what would overlap,
+and a few last steps of conformal energy trade a little area for angles, which is what the paper's losses ask for.
 
 A disk always has a valid map to the circle, so one chart fails only where a triangle is too thin for float64; then the
 faces are split as everywhere else, and the report says so.
@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import igl
 import numpy as np
 
-from ...runtime.distortion import corner_angles
 from ...runtime.errors import ShapeError
 from ...runtime.mesh import Surface
 from ...runtime.overlap import flipped_triangles, signed_areas
 from ...runtime.topology import boundary_loops, edge_table, split_non_manifold_vertices
 from ..config import FinishConfig
-from ..contact import Relaxed, boundary_edges, excess_energy, relax, rim_overlaps, separate
+from ..contact import Relaxed, excess_energy, relax
 from ..disks import cut_open
 from ..finish import Finished, verify
 from ..flatten import circle_map
@@ -33,6 +32,8 @@ from ..pieces import Piece, border_length
 from ..regroup import Regrouping
 from ..relief import Flat, Slit, relieve, slit_along
 from ..surrogate import simplified
+from ..workers import parallel_map
+from .conformal import ConformalConfig, conformal_steps, is_valid
 from .seams import SeamConfig, seam_edges, tears
 
 if TYPE_CHECKING:
@@ -58,10 +59,8 @@ class GlobalFinishConfig:
     """Slits that may fail to pay before the component is left as it is."""
     steps: int = 30
     """Steps of SLIM with contacts, where the chart would overlap: long cuts need more of them than slits do."""
-    conformal: int = 20
-    """SLIM iterations of conformal energy at the end, at most; 0 leaves the isometric map."""
-    enough: float = 0.02
-    """Conformality (radians) at which they end: a third of the paper's; below, areas are worth more than angles."""
+    conformal: ConformalConfig = field(default_factory=ConformalConfig)
+    """Angles for areas, before and after the isometric steps."""
 
 
 class Opened(NamedTuple):
@@ -163,28 +162,47 @@ def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> 
     if start is None:
         return ()
     relief = replace(config.finish.relief, most=config.slits, failures=config.failures)
-    flat = Flat(twin, start, {}).relaxed(replace(relief.contact, steps=config.steps))
+    flat = Flat(twin, *lowest(twin, {"circle": start}, config)[1])
     return relieve(flat, total_area, relief)[1]
 
 
 def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfig) -> tuple[Flat | None, str]:
     """The disk with slits, valid, and where it began: "network" or "circle".
 
-    Both are tried, as either may end in an overlap that contacts hardly loosen; the lower energy is taken.  None and
-    "none" where neither start is valid.
+    None and "none" where neither start is valid.
     """
-    contact = replace(config.finish.relief.contact, steps=config.steps)
     disk = slit_along(opened.surface, slits, config.finish.relief)
-    starts = {"circle": circle_start(disk)}
-    learned = learned_start(opened)
+    circle, learned = circle_start(disk), learned_start(opened)
+    starts = {} if circle is None else {"circle": circle}
     if learned is not None:  # a slit leaves the flattening as it is: both sides take the uv of their vertex
         starts["network"] = np.zeros((len(disk.vertices), 2))
         starts["network"][disk.faces] = learned[opened.surface.faces]
-    states = {name: relax(disk, Relaxed(uv, {}), contact) for name, uv in starts.items() if uv is not None}
-    if not states:
+    if not starts:
         return None, "none"
-    name = min(states, key=lambda name: excess_energy(disk, states[name].uv))
-    return Flat(disk, conformal_steps(disk, states[name], config), {}), name
+    name, state = lowest(disk, starts, config)
+    return Flat(disk, conformal_steps(disk, state.uv, config.conformal), {}), name
+
+
+def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: GlobalFinishConfig) -> tuple[str, Relaxed]:
+    """The state of least energy that SLIM with contacts reaches, and the valid uv (v, 2) that it began with, by name.
+
+    Any of them may end in an overlap that contacts hardly loosen, so each is tried as it is and after conformal steps:
+    straight from a circle, isometric energy mostly unfolds long strips over each other.
+    """
+    contact = replace(config.finish.relief.contact, steps=config.steps)
+
+    def tried(start: tuple[str, bool]) -> Relaxed:
+        name, spread = start
+        return relax(
+            disk,
+            Relaxed(conformal_steps(disk, starts[name], config.conformal) if spread else starts[name], {}),
+            contact,
+        )
+
+    tries = [(name, spread) for name in starts for spread in (True, False)]
+    states = parallel_map(tried, tries)
+    best = min(range(len(tries)), key=lambda number: excess_energy(disk, states[number].uv))
+    return tries[best][0], states[best]
 
 
 def learned_start(opened: Opened, rounds: int = 6) -> NDArray[np.float64] | None:
@@ -227,51 +245,7 @@ def at_scale(opened: Opened) -> NDArray[np.float64] | None:
     return opened.uv * scale * [np.sign(area.sum()), 1.0]
 
 
-def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
-    """No flip, and a border that doesn't cross itself: for a disk, no overlap."""
-    if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
-        return False
-    return not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)
-
-
 def circle_start(disk: Surface) -> NDArray[np.float64] | None:
     """The map (v, 2) to the circle; None where float64 can't hold it without a flip."""
     uv = circle_map(disk, boundary_loops(disk.faces)[0])
     return uv if np.isfinite(uv).all() and not flipped_triangles(uv[disk.faces]).any() else None
-
-
-def conformal_steps(disk: Surface, state: Relaxed, config: GlobalFinishConfig) -> NDArray[np.float64]:
-    """The uv (v, 2) after SLIM with conformal energy, at the surface's scale; ``state`` where no valid end is found.
-
-    From an isometric map that took its slits, angles improve fast and areas give way a little; from a map that is far
-    from isometric, areas would vary without bound, so the iterations are few.  Overlap that comes on the way mostly
-    goes again: the last valid state counts, and contacts take apart what is left at the end.
-    """
-    contact = config.finish.relief.contact
-    solver = igl.slim_precompute(
-        np.asfortranarray(disk.vertices),
-        np.asfortranarray(disk.faces.astype(np.int32)),
-        np.asfortranarray(state.uv),
-        igl.MappingEnergyType.CONFORMAL,
-        np.zeros(0, dtype=np.int32),
-        np.zeros((0, 2)),
-        0.0,
-    )
-    best = uv = state.uv
-    for _ in range(config.conformal // contact.iterations):
-        if best is uv and angle_error(disk, best) < config.enough:
-            break
-        uv = np.ascontiguousarray(igl.slim_solve(solver, contact.iterations))
-        uv = uv * np.sqrt(disk.face_areas().sum() / np.abs(signed_areas(uv[disk.faces])).sum())
-        if is_valid(disk, uv):
-            best = uv
-    if best is uv or flipped_triangles(uv[disk.faces]).any():
-        return best
-    apart = separate(disk, Relaxed(uv, {}), boundary_edges(disk.faces), contact)
-    candidates = [best] if apart is None or not is_valid(disk, apart.uv) else [best, apart.uv]
-    return min(candidates, key=lambda flat: angle_error(disk, flat))
-
-
-def angle_error(disk: Surface, uv: NDArray[np.float64]) -> float:
-    """Mean |angle − uv angle| over the corners of the faces, radians: the paper's conformality."""
-    return float(np.abs(corner_angles(disk.triangles) - corner_angles(uv[disk.faces])).mean())

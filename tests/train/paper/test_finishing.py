@@ -13,15 +13,14 @@ from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.meshfile import load_asset
 from flexpara.runtime.metrics import Metrics, measure
 from flexpara.runtime.samples import make_sample
-from flexpara.train.contact import Relaxed
+from flexpara.train.contact import excess_energy
 from flexpara.train.disks import is_disk
+from flexpara.train.flatten import slim
+from flexpara.train.paper.conformal import ConformalConfig, angle_error, conformal_steps, is_valid
 from flexpara.train.paper.finishing import (
     GlobalFinish,
     GlobalFinishConfig,
-    angle_error,
-    conformal_steps,
     finish_global,
-    is_valid,
     learned_start,
     open_along_seam,
 )
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CONFIG = GlobalFinishConfig()
+CONFORMAL = ConformalConfig()
 
 
 def quiet(stage: str) -> None:
@@ -158,11 +158,38 @@ def test_conformal_steps_trade_areas_for_angles_and_stay_valid() -> None:
     cap = sample("cloth", 24)
     bent = Surface(cap.vertices * [1.0, 1.0, 3.0], cap.faces)
     uv = bent.vertices[:, :2]
-    angles = conformal_steps(bent, Relaxed(uv, {}), CONFIG)
+    angles = conformal_steps(bent, uv, CONFORMAL)
     assert is_valid(bent, angles)
     assert angle_error(bent, angles) < 0.3 * angle_error(bent, uv)
-    assert 0.0 < angle_error(bent, conformal_steps(bent, Relaxed(uv, {}), replace(CONFIG, enough=0.2))) < 0.2
-    assert np.array_equal(conformal_steps(bent, Relaxed(uv, {}), replace(CONFIG, conformal=0)), uv)
+    assert 0.0 < angle_error(bent, conformal_steps(bent, uv, replace(CONFORMAL, enough=0.2))) < 0.2
+    assert np.array_equal(conformal_steps(bent, uv, replace(CONFORMAL, iterations=0)), uv)
+
+
+def test_conformal_steps_end_where_areas_would_cost_more_than_allowed() -> None:
+    cap = sample("cloth", 24)
+    bent = Surface(cap.vertices * [1.0, 1.0, 3.0], cap.faces)
+    uv, area = slim(bent, bent.vertices[:, :2], 50), float(bent.face_areas().sum())
+    free = conformal_steps(bent, uv, replace(CONFORMAL, dearer=1e6))
+    limit = 0.5 * (excess_energy(bent, uv) + excess_energy(bent, free))
+    assert excess_energy(bent, uv) < limit < excess_energy(bent, free)
+    tight = replace(CONFORMAL, dearer=limit / excess_energy(bent, uv), allowance=0.0, block=1)
+    found = conformal_steps(bent, uv, tight)
+    assert excess_energy(bent, found) <= limit
+    still = conformal_steps(bent, uv, replace(tight, dearer=0.0, allowance=0.5 * excess_energy(bent, uv) / area))
+    assert np.array_equal(still, uv)
+
+
+def test_a_knotted_tube_opened_along_its_seams_is_laid_flat() -> None:
+    knot = sample("trefoil", 40)
+    place = np.arange(len(knot.vertices))
+    along, around = (
+        2.0 * np.pi * part / count - np.pi for part, count in zip(np.divmod(place, 6), (120, 6), strict=True)
+    )
+    uv = np.stack([2.0 * banded(along, 0.1), 0.12 * banded(around, 0.4)], axis=1)
+    metrics = figures(knot, finish_global(knot, uv, quiet))
+    assert (metrics.charts, metrics.flipped_faces, metrics.overlap_fraction) == (1, 0, 0.0)
+    assert metrics.conformal_mean < 0.05
+    assert metrics.symmetric_dirichlet_mean < 1.1
 
 
 @pytest.mark.parametrize("width", [0.0, 0.2])

@@ -1,0 +1,102 @@
+"""Angles for areas: SLIM with conformal energy on one disk, from a valid map to a valid map.   v vertices.
+
+Valid means: no flipped triangle, and a border that doesn't cross itself.  uv (v, 2) are at the surface's scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.distortion import corner_angles
+from ...runtime.overlap import flipped_triangles, signed_areas
+from ..config import ContactConfig
+from ..contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
+from ..flatten import CONFORMAL, Slim, slim
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Surface
+
+
+@dataclass(frozen=True)
+class ConformalConfig:
+    """How far angles are bought with areas."""
+
+    iterations: int = 20
+    """SLIM iterations of conformal energy, at most; 0 leaves the map as it is."""
+    enough: float = 0.02
+    """Conformality (radians) at which they end: a third of the paper's; below, areas are worth more than angles."""
+    dearer: float = 4.0
+    """Factor by which the symmetric Dirichlet excess energy may grow …"""
+    allowance: float = 0.05
+    """… beyond this, which is per area."""
+    block: int = 2
+    """Iterations between two tests."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """What holds the chart apart."""
+
+
+def conformal_steps(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> NDArray[np.float64]:
+    """The valid uv (v, 2) after SLIM with conformal energy; ``start`` where none is found.
+
+    From an isometric map that took its slits, angles improve fast and areas give way a little; from a circle areas
+    vary widely, but little overlaps on the way.  Overlap that comes on the way mostly goes again; where it doesn't,
+    contacts hold the chart apart from the last valid map on.
+    """
+    solver, best, uv = Slim(disk, start, energy=CONFORMAL), start, start
+    dearest = highest_energy(disk, start, config)
+    for _ in range(config.iterations // config.block):
+        if best is uv and angle_error(disk, best) < config.enough:
+            return best
+        uv = at_scale_of(disk, solver.run(config.block))
+        if excess_energy(disk, uv) > dearest:
+            break
+        if is_valid(disk, uv):
+            best = uv
+    return best if best is uv else conformal_contacts(disk, best, dearest, config)
+
+
+def conformal_contacts(
+    disk: Surface, start: NDArray[np.float64], dearest: float, config: ConformalConfig
+) -> NDArray[np.float64]:
+    """The uv (v, 2) after single conformal iterations from a valid ``start``, each taken apart before the next."""
+    edges, contact, best = boundary_edges(disk.faces), config.contact, start
+    state = Relaxed(start, {})
+    for _ in range(config.iterations):
+        if angle_error(disk, best) < config.enough:
+            break
+        moved = slim(disk, state.uv, 1, as_pins(state.pins, contact.weight), CONFORMAL)
+        apart = separate(disk, Relaxed(moved, state.pins), edges, contact, CONFORMAL)
+        if apart is None:
+            break
+        state, uv = apart, at_scale_of(disk, apart.uv)
+        if not is_valid(disk, uv) or excess_energy(disk, uv) > dearest:
+            break
+        best = uv
+    return best
+
+
+def highest_energy(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> float:
+    """The excess energy up to which angles are bought with areas."""
+    return config.dearer * excess_energy(disk, start) + config.allowance * float(disk.face_areas().sum())
+
+
+def at_scale_of(disk: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The uv (v, 2) with the area of the disk."""
+    return uv * np.sqrt(disk.face_areas().sum() / np.abs(signed_areas(uv[disk.faces])).sum())
+
+
+def angle_error(disk: Surface, uv: NDArray[np.float64]) -> float:
+    """Mean |angle − uv angle| over the corners of the faces, radians: the paper's conformality."""
+    return float(np.abs(corner_angles(disk.triangles) - corner_angles(uv[disk.faces])).mean())
+
+
+def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
+    """No flip, and a border that doesn't cross itself: for a disk, no overlap."""
+    if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
+        return False
+    return not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)
