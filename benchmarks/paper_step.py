@@ -1,10 +1,10 @@
 """Steps per second of preset paper against a literal transcription of the paper's step, at the paper's sizes.
 
-    python -m benchmarks.paper_step [--points 4900] [--charts 8] [--repeat 3] [--threads 2]
+    python -m benchmarks.paper_step [--points 4900] [--charts 8] [--repeat 5] [--threads 2]
 
 The literal step is written as the paper's equations read: one network a chart in a Python loop, Jacobians by three
 reverse passes with create_graph, nearest neighbours from whole distance matrices, float32, torch.optim.AdamW.
-Both sides take the same points; a row's time is the median of its steps after one that warms up.
+All sides take the same points and step in turn; a time is the median of its steps after one that warms up.
 """
 
 from __future__ import annotations
@@ -178,17 +178,17 @@ def our_step(samples: PaperInput, config: PaperConfig) -> Callable[[], None]:
     return step
 
 
-def seconds_a_step(step: Callable[[], None], repeat: int) -> float:
-    """Median after one step that warms up."""
-    step()
-    taken = []
-    for _ in range(repeat):
-        start = time.perf_counter()
-        step()
-        if torch.cuda.is_available():
-            torch.cuda.synchronize()
-        taken.append(time.perf_counter() - start)
-    return statistics.median(taken)
+def seconds_a_step(steps: list[Callable[[], None]], repeat: int) -> list[float]:
+    """Medians after one step each that warms up; taken in turn, so that a host that slows down slows all of them."""
+    taken: list[list[float]] = [[] for _ in steps]
+    for _ in range(repeat + 1):
+        for step, seconds in zip(steps, taken, strict=True):
+            start = time.perf_counter()
+            step()
+            if torch.cuda.is_available():
+                torch.cuda.synchronize()
+            seconds.append(time.perf_counter() - start)
+    return [statistics.median(seconds[1:]) for seconds in taken]
 
 
 def torus_input(points: int) -> PaperInput:
@@ -214,7 +214,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Steps per second of preset paper against a literal transcription.")
     parser.add_argument("--points", type=int, default=4900)
     parser.add_argument("--charts", type=int, default=8)
-    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--threads", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
@@ -227,14 +227,11 @@ def main() -> None:
     modes = (("global", literal_global_step), ("multi-chart", literal_chart_step))
     for mode, literal in modes:
         config = PaperConfig(mode=mode, charts=arguments.charts, points=len(points))
-        slow = seconds_a_step(literal(samples, points, config), arguments.repeat)
-        ours = [
-            seconds_a_step(our_step(samples, replace(config, dtype=dtype)), arguments.repeat)
-            for dtype in ("float32", "bfloat16")
-        ]
-        cells = [f"{slow:.2f}", f"{ours[0]:.2f}", f"{slow / ours[0]:.1f}", f"{ours[1]:.2f}", f"{slow / ours[1]:.1f}"]
+        ours = [our_step(samples, replace(config, dtype=dtype)) for dtype in ("float32", "bfloat16")]
+        slow, *fast = seconds_a_step([literal(samples, points, config), *ours], arguments.repeat)
+        cells = [f"{slow:.2f}", *(cell for value in fast for cell in (f"{value:.2f}", f"{slow / value:.1f}"))]
         name = mode if mode == "global" else f"{mode}, K = {arguments.charts}"
-        print(f"| {name} | {' | '.join(cells)} | {1 / ours[1]:.2f} |", flush=True)
+        print(f"| {name} | {' | '.join(cells)} | {1 / fast[1]:.2f} |", flush=True)
 
 
 if __name__ == "__main__":
