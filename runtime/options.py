@@ -18,8 +18,8 @@ ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirect
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "obj", "ply", "usda")
 LARGEST_SEED = 2**32 - 1
-MOST = {"steps": 99_999_999, "width": 8192, "points": 1_000_000}
-"""Of preset paper."""
+PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
+"""Least and most of preset paper's numbers."""
 AUTO = "auto"
 
 
@@ -66,10 +66,10 @@ class Options:
             _demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
         for name in self.ablation:
             _demand(name in ABLATIONS, f"ablation is {name!r}, expected some of {', '.join(ABLATIONS)}; correct it")
-        for name, least in (("steps", 1), ("width", 1), ("points", 16)):
+        for name, (least, most) in PAPER_RANGES.items():
             value = getattr(self, name)
-            fits = value is None or least <= value <= MOST[name]
-            _demand(fits, f"{name} is {value}, expected {least} to {MOST[name]}; leave --{name} out")
+            fits = value is None or least <= value <= most
+            _demand(fits, f"{name} is {value}, expected {least} to {most}; leave --{name} out")
         for name in ("mode", "steps", "width", "points", "precision", "ablation"):
             value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
             found = f"{name} is {value!r}, expected {default!r} with preset {self.preset}"

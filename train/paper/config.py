@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from typing import Any, Literal
 
 from ...runtime.errors import InputError
+from ...runtime.options import PAPER_RANGES
 
 Mode = Literal["global", "multi-chart"]
 PAPER_HIDDEN = 512
@@ -147,11 +148,11 @@ class PaperConfig:
         _known("device", self.device, ("auto", "cpu", "cuda"))
         _within("charts", self.charts, 1, 256)
         _within("seed", self.seed, 0, 2**63 - 1)
-        _within("steps", self.steps, 1, 99_999_999)
-        _within("points", self.points, 16, 1_000_000)
+        _within("steps", self.steps, *PAPER_RANGES["steps"])
+        _within("points", self.points, *PAPER_RANGES["points"])
         for name in ("neighbours", "edge_neighbours", "cut_neighbours"):
             _within(name, getattr(self, name), 1, 1000)
-        _within("nets.hidden", self.nets.hidden, 1, 8192)
+        _within("nets.hidden", self.nets.hidden, *PAPER_RANGES["width"])
         _within("nets.embedding", self.nets.embedding, 1, 8192)
         for name in ("rate", "final_rate", "decay", "epsilon", "cut_share", "score_spread"):
             _finite(name, getattr(self, name))

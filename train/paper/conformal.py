@@ -5,14 +5,13 @@ Valid means: no flipped triangle, and a border that doesn't cross itself.  uv (v
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.distortion import corner_angles
 from ...runtime.overlap import flipped_triangles, signed_areas
-from ..config import ContactConfig
 from ..contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
 from ..flatten import CONFORMAL, Slim, slim
 
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
+    from ..config import ContactConfig
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class ConformalConfig:
     """… beyond this, which is per area."""
     block: int = 2
     """Iterations between two tests."""
-    contact: ContactConfig = field(default_factory=ContactConfig)
-    """What holds the chart apart."""
 
 
-def conformal_steps(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> NDArray[np.float64]:
+def conformal_steps(
+    disk: Surface, start: NDArray[np.float64], config: ConformalConfig, contact: ContactConfig
+) -> NDArray[np.float64]:
     """The valid uv (v, 2) after SLIM with conformal energy; ``start`` where none is found.
 
     From an isometric map that took its slits, angles improve fast and areas give way a little; from a circle areas
@@ -57,14 +57,14 @@ def conformal_steps(disk: Surface, start: NDArray[np.float64], config: Conformal
             break
         if is_valid(disk, uv):
             best = uv
-    return best if best is uv else conformal_contacts(disk, best, dearest, config)
+    return best if best is uv else conformal_contacts(disk, best, dearest, config, contact)
 
 
 def conformal_contacts(
-    disk: Surface, start: NDArray[np.float64], dearest: float, config: ConformalConfig
+    disk: Surface, start: NDArray[np.float64], dearest: float, config: ConformalConfig, contact: ContactConfig
 ) -> NDArray[np.float64]:
     """The uv (v, 2) after single conformal iterations from a valid ``start``, each taken apart before the next."""
-    edges, contact, best = boundary_edges(disk.faces), config.contact, start
+    edges, best = boundary_edges(disk.faces), start
     state = Relaxed(start, {})
     for _ in range(config.iterations):
         if angle_error(disk, best) < config.enough:

@@ -180,7 +180,7 @@ def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfi
     if not starts:
         return None, "none"
     name, state = lowest(disk, starts, config)
-    return Flat(disk, conformal_steps(disk, state.uv, config.conformal), {}), name
+    return Flat(disk, conformal_steps(disk, state.uv, config.conformal, config.finish.relief.contact), {}), name
 
 
 def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: GlobalFinishConfig) -> tuple[str, Relaxed]:
@@ -193,11 +193,8 @@ def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: Global
 
     def tried(start: tuple[str, bool]) -> Relaxed:
         name, spread = start
-        return relax(
-            disk,
-            Relaxed(conformal_steps(disk, starts[name], config.conformal) if spread else starts[name], {}),
-            contact,
-        )
+        uv = conformal_steps(disk, starts[name], config.conformal, contact) if spread else starts[name]
+        return relax(disk, Relaxed(uv, {}), contact)
 
     tries = [(name, spread) for name in starts for spread in (True, False)]
     states = parallel_map(tried, tries)

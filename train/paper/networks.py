@@ -59,14 +59,14 @@ class Affine(Dense):
         """The same on jets (3, …, n, c): only the value gets the bias."""
         x, weight = in_precision(x, self.weight, dtype)
         bias = self.bias.to(dtype)
-        product = ExactProduct.apply(x, weight) if x.dtype == torch.bfloat16 != dtype else x @ weight
-        return product + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
+        return x @ weight + torch.stack([bias, *(torch.zeros_like(bias),) * 2])
 
 
 class ExactProduct(torch.autograd.Function):
     """bfloat16 features x (…, n, c_in) times a float32 weight (…, c_in, c_out), in float32: what makes coordinates.
 
-    Gradients go back in the features' own bfloat16, as in the layers before; in float32 they would be slow.
+    Gradients go back in the features' own bfloat16, as in the layers before; in float32 they would be slow.  Jets,
+    which make Jacobians too, go back in float32.
     """
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""AdamW with a half-cosine rate, all parameters as one vector, and a state that can be saved.
+"""AdamW with a half-cosine rate, each moment of all parameters as one vector, and a state that can be saved.
 
 torch.optim would do, but its first use imports torch's compiler, and its state is not plain tensors.  Like torch.optim
 it is written with torch's _foreach functions, which take all parameters at once and are not declared public.

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 CONFIG = GlobalFinishConfig()
 CONFORMAL = ConformalConfig()
+CONTACT = CONFIG.finish.relief.contact
 
 
 def quiet(stage: str) -> None:
@@ -158,24 +159,26 @@ def test_conformal_steps_trade_areas_for_angles_and_stay_valid() -> None:
     cap = sample("cloth", 24)
     bent = Surface(cap.vertices * [1.0, 1.0, 3.0], cap.faces)
     uv = bent.vertices[:, :2]
-    angles = conformal_steps(bent, uv, CONFORMAL)
+    angles = conformal_steps(bent, uv, CONFORMAL, CONTACT)
     assert is_valid(bent, angles)
     assert angle_error(bent, angles) < 0.3 * angle_error(bent, uv)
-    assert 0.0 < angle_error(bent, conformal_steps(bent, uv, replace(CONFORMAL, enough=0.2))) < 0.2
-    assert np.array_equal(conformal_steps(bent, uv, replace(CONFORMAL, iterations=0)), uv)
+    assert 0.0 < angle_error(bent, conformal_steps(bent, uv, replace(CONFORMAL, enough=0.2), CONTACT)) < 0.2
+    assert np.array_equal(conformal_steps(bent, uv, replace(CONFORMAL, iterations=0), CONTACT), uv)
 
 
 def test_conformal_steps_end_where_areas_would_cost_more_than_allowed() -> None:
     cap = sample("cloth", 24)
     bent = Surface(cap.vertices * [1.0, 1.0, 3.0], cap.faces)
     uv, area = slim(bent, bent.vertices[:, :2], 50), float(bent.face_areas().sum())
-    free = conformal_steps(bent, uv, replace(CONFORMAL, dearer=1e6))
+    free = conformal_steps(bent, uv, replace(CONFORMAL, dearer=1e6), CONTACT)
     limit = 0.5 * (excess_energy(bent, uv) + excess_energy(bent, free))
     assert excess_energy(bent, uv) < limit < excess_energy(bent, free)
     tight = replace(CONFORMAL, dearer=limit / excess_energy(bent, uv), allowance=0.0, block=1)
-    found = conformal_steps(bent, uv, tight)
+    found = conformal_steps(bent, uv, tight, CONTACT)
     assert excess_energy(bent, found) <= limit
-    still = conformal_steps(bent, uv, replace(tight, dearer=0.0, allowance=0.5 * excess_energy(bent, uv) / area))
+    still = conformal_steps(
+        bent, uv, replace(tight, dearer=0.0, allowance=0.5 * excess_energy(bent, uv) / area), CONTACT
+    )
     assert np.array_equal(still, uv)
 
 
