@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from . import runtime as runtime
     from . import train as train
     from .export.unwrapping import Unwrapped
-    from .runtime.cloud import CloudMesh, PointCloud
     from .runtime.files import OutputFolder
+    from .runtime.io.cloud import CloudMesh, PointCloud
+    from .runtime.io.meshfile import MeshLike
+    from .runtime.io.meshfile import load as load
     from .runtime.mesh import Asset, Atlas, Charts, Frame
-    from .runtime.meshfile import MeshLike
-    from .runtime.meshfile import load as load
     from .runtime.options import Options, Outputs
     from .runtime.progress import Progress
-    from .runtime.session import UnwrapSession
-    from .train.networks import AtlasNetworks
+    from .runtime.sessions.session import UnwrapSession
+    from .train.learn.networks import AtlasNetworks
 
 __version__ = "0.1.0"
 __all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResult", "UnwrapSession", "load", "unwrap"]
@@ -40,10 +40,10 @@ __all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResul
 _HOME = {
     "Asset": "mesh",
     "Atlas": "mesh",
-    "load": "meshfile",
+    "load": "io.meshfile",
     "Options": "options",
     "Outputs": "options",
-    "UnwrapSession": "session",
+    "UnwrapSession": "sessions.session",
 }
 _FOLDERS = ("bake", "export", "runtime", "train")
 
@@ -96,7 +96,7 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[train] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
-    from .runtime.cloud import PointCloud
+    from .runtime.io.cloud import PointCloud
     from .runtime.options import Options
 
     options = Options(charts, size, padding, seed, preset, mode, steps, width, points, precision, tuple(ablation))
@@ -108,9 +108,9 @@ def unwrap(
 
 def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
     """A mesh as an Asset, a file without faces as a PointCloud.  Raises: InputError when it is neither."""
-    from .runtime.cloud import PointCloud
-    from .runtime.cloudfile import is_cloud, load_cloud
-    from .runtime.meshfile import load
+    from .runtime.io.cloud import PointCloud
+    from .runtime.io.cloudfile import is_cloud, load_cloud
+    from .runtime.io.meshfile import load
 
     if isinstance(source, PointCloud):
         return source
@@ -146,7 +146,7 @@ def unwrap_cloud(
 
     with requires("train"):
         from .export.unwrapping import assemble, train_asset
-        from .train.reconstruct import reconstruct
+        from .train.cloud.reconstruct import reconstruct
 
     clock = Clock(progress)
     with clock.stage("triangulate"):
@@ -189,8 +189,8 @@ class UnwrapResult:
 
         Raises: InputError for a mesh, whose uv are those of the atlas.
         """
-        from .runtime.cloud import point_uv
         from .runtime.errors import InputError
+        from .runtime.io.cloud import point_uv
 
         if self.cloud_mesh is None:
             raise InputError("point_uv of a mesh, expected a point cloud; use result.atlas")
@@ -268,7 +268,7 @@ class UnwrapResult:
 
     def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:
         """The user's points with their uv and chart, as .npz and, in place of the mesh, as .ply."""
-        from .runtime.cloudwrite import write_cloud_npz, write_cloud_ply
+        from .runtime.io.cloudwrite import write_cloud_npz, write_cloud_ply
 
         uv, chart = self.point_uv()
         for name, write in zip(point_files(output.stem), (write_cloud_ply, write_cloud_npz), strict=True):

@@ -304,7 +304,7 @@ def _torch_device() -> str:
 
 
 def _opengl() -> str:
-    info = import_module(".bake.context", __package__).describe()
+    info = import_module(".bake.raster.context", __package__).describe()
     return f"{info.renderer}, {info.version}, up to {info.max_size} texels"
 
 

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..runtime.errors import InputError
-from .context import open_context
-from .functions import SurfaceFunction, function_map, surface_alone
-from .gbuffer import GBuffer, rasterize
-from .gutter import check_padding, fill_gutters
-from .images import Texture, write_texture
-from .layout import check_size
-from .maps import BakeMap, NormalFormat, find_map
+from .files.images import Texture, write_texture
+from .maps.functions import SurfaceFunction, function_map, surface_alone
+from .maps.maps import BakeMap, NormalFormat, find_map
+from .raster.context import open_context
+from .raster.gbuffer import GBuffer, rasterize
+from .raster.gutter import check_padding, fill_gutters
+from .raster.layout import check_size
+from .raster.tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
 from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_changes, seam_error
-from .tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
-    from .images import FileType
-    from .tiles import BakedWindow, Device
+    from .files.images import FileType
+    from .raster.tiles import BakedWindow, Device
 
 VISIBLE = 0.5 / 255.0
 """Difference across a seam, as a share of a map's range, up to which gutters stay as they are."""

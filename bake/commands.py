@@ -15,7 +15,7 @@ from ..runtime.progress import Clock, progress_bars
 from .output import bleeding, check_outputs, chosen_maps, padding_of, texture_facts, with_tangents, write_textures
 
 if TYPE_CHECKING:
-    from .highmaps import HighSource
+    from .highpoly.highmaps import HighSource
 
 
 def bake(
@@ -90,8 +90,8 @@ def bake(
         raise InputError("udim with a target or layers, expected one of the three; leave the others out")
     chosen_maps(outputs)
     from ..runtime.files import OutputFolder
-    from ..runtime.meshfile import load
-    from ..runtime.packing import atlas_from_uv
+    from ..runtime.io.meshfile import load
+    from ..runtime.pack.packing import atlas_from_uv
 
     asset = load(mesh)
     source = _high_source(high or [], cage, match_names=match_names)
@@ -137,9 +137,9 @@ def _high_source(paths: list[Path], cage: str, *, match_names: bool) -> HighSour
     if not paths:
         return None
     with requires("bake"):
-        from .cage import CageSettings
-        from .highmaps import HighSource
-    from ..runtime.meshfile import load_asset
+        from .highpoly.cage import CageSettings
+        from .highpoly.highmaps import HighSource
+    from ..runtime.io.meshfile import load_asset
 
     try:
         settings = CageSettings(float(cage), match_names=match_names)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas
     from ..runtime.options import Outputs
     from ..runtime.progress import Clock
-    from .exr import ExrSettings
-    from .highmaps import HighSource
-    from .images import Texture
-    from .maps import BakeMap
+    from .files.exr import ExrSettings
+    from .files.images import Texture
+    from .highpoly.highmaps import HighSource
+    from .maps.maps import BakeMap
 
 LARGE = 8192
 """Side from which images are kept on disk while they are baked."""
@@ -57,9 +57,9 @@ def chosen_maps(
     if not outputs.maps and not fields:
         return []
     with requires("bake"):
-        from .field import field_map
-        from .maps import find_map
-        from .rays import RaySettings
+        from .maps.field import field_map
+        from .maps.maps import find_map
+        from .maps.rays import RaySettings
     green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
     entries = [find_map(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
     if high is not None:
@@ -84,7 +84,11 @@ def check_outputs(
         names += [f"{output.stem}.{ending}" for ending in endings]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
     output.check([*names, output.report_name])
-    wanted = {"baker": bool(maps), "gltf": meshes and "glb" in outputs.formats, "preview": outputs.preview}
+    wanted = {
+        "baker": bool(maps),
+        "files.gltf": meshes and "glb" in outputs.formats,
+        "pictures.preview": outputs.preview,
+    }
     with requires("bake"):
         for module in (name for name, needed in wanted.items() if needed):
             import_module(f".{module}", __package__)
@@ -93,7 +97,7 @@ def check_outputs(
 def check_green(outputs: Outputs) -> None:
     """USD reads +Y, and a usda file names the normal map beside it.  Raises: InputError where that is −Y."""
     with requires("bake"):
-        from .targets import find_target
+        from .files.targets import find_target
     green = outputs.normal_format if outputs.target is None else find_target(outputs.target).green
     if green != "opengl":
         raise InputError(f"format usda beside {green} normal maps, expected opengl; leave usda or that choice out")
@@ -104,7 +108,7 @@ def padding_of(padding: int | None, target: str | None, size: int) -> int | None
     if target is None:
         return padding
     with requires("bake"):
-        from .targets import find_target
+        from .files.targets import find_target
     preset = find_target(target)
     return preset.padding(size) if padding is None else padding
 
@@ -125,7 +129,7 @@ def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list
         return list(
             texture_names({entry.name: entry for entry in maps}, stem, file_type=outputs.texture_format).values()
         )
-    from .targets import find_target
+    from .files.targets import find_target
 
     plain = find_target(outputs.target).file_names([entry.name for entry in maps], stem).values()
     return [f"{name}.{ending}" for name in plain for ending in ("png", "exr")]
@@ -152,7 +156,7 @@ def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
     """The atlas as it is written: each vertex in one tangent group where a map is in tangent space."""
     if not any(entry.space.startswith("tangent") for entry in maps):
         return atlas
-    from .tangents import split_by_tangents
+    from .maps.tangents import split_by_tangents
 
     return split_by_tangents(atlas)
 
@@ -190,13 +194,13 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
     """Texture files by product: those of the target, one EXR with layers, or one a map."""
     stem, found = output.stem, {}
     if outputs.layers:
-        from .exr import file_metadata, write_layers
+        from .files.exr import file_metadata, write_layers
 
         settings, metadata = exr_settings(outputs), file_metadata(asset, normal_format=outputs.normal_format)
         output.write(f"{stem}.exr", lambda path: write_layers(textures, path, settings, metadata=metadata))
         return dict.fromkeys(textures, f"{stem}.exr")
     if outputs.target is not None:
-        from .targets import find_target, write_target
+        from .files.targets import find_target, write_target
 
         target = find_target(outputs.target)
 
@@ -215,21 +219,21 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
 
 def exr_settings(outputs: Outputs) -> ExrSettings:
     """How layers are stored.  Raises: EncodingError for a compression that OpenEXR has not."""
-    from .exr import ExrSettings
+    from .files.exr import ExrSettings
 
     return ExrSettings(outputs.exr_bits, cast("Any", outputs.exr_compression))
 
 
 def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
     """The mesh in each format asked for."""
-    from ..runtime.meshwrite import write_obj, write_ply
+    from ..runtime.io.meshwrite import write_obj, write_ply
 
     stem, files = output.stem, baked.files
     shown = next((files[name] for name in ("base-color", "uv-checker", "chart") if name in files), None)
     if "glb" in outputs.formats:
         with requires("bake"):
-            from .gltf import write_glb
-            from .targets import GLTF, with_green
+            from .files.gltf import write_glb
+            from .files.targets import GLTF, with_green
         # glTF's normal maps are +Y whatever the files beside it are
         textures = {
             name: with_green(texture, GLTF.green) if name == "normal" else texture
@@ -242,7 +246,7 @@ def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outp
         output.write(f"{stem}.ply", lambda path: write_ply(atlas, path, colors=asset.colors))
     if "usda" in outputs.formats:
         with requires("bake"):
-            from .usd import write_usda
+            from .files.usd import write_usda
         color = baked.textures.get("base-color")
         alpha = color is not None and color.pixels.shape[2] == 4
         named = {USD_KEYS.get(name, name): file for name, file in files.items()}
@@ -268,9 +272,9 @@ def bleeding(atlas: Atlas, size: int, padding: int) -> int:
 
 def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
     """The preview; without OpenGL a warning in its place."""
-    from ..runtime.metrics import face_distortion
-    from .preview import render_preview
-    from .tiles import SoftwareWarning
+    from ..runtime.geometry.metrics import face_distortion
+    from .pictures.preview import render_preview
+    from .raster.tiles import SoftwareWarning
 
     stretch = face_distortion(asset.surface, atlas.corner_uv)
     try:

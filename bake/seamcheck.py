@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from .layout import border_edges
+from .raster.layout import border_edges
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas
-    from .images import Texture
+    from .files.images import Texture
 
 PER_TEXEL = 2.0
 """Samples per texel of a seam's length."""

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..runtime.mesh import Asset, Atlas
-    from .images import FileType, Texture
-    from .maps import BakeMap
+    from .files.images import FileType, Texture
+    from .maps.maps import BakeMap
 
 FIRST, ACROSS, UP = 1001, 10, 100
 """Number of the first tile, tiles in a row, rows."""

@@ -25,26 +25,26 @@ import numpy as np
 from benchmarks.raster import COMMAND_BAR, RATE_BAR, command_seconds, drawing_rates
 from benchmarks.unwrap import ROOT, header, timed
 from flexpara.bake.baker import bake, make_gbuffer
-from flexpara.bake.cage import CageSettings
-from flexpara.bake.highmaps import HighSource
-from flexpara.bake.highmesh import atlas_of
-from flexpara.bake.images import write_texture
-from flexpara.bake.maps import find_map
-from flexpara.bake.occlusion import ambient_occlusion, starting_points
-from flexpara.bake.rays import BATCH, RayScene, RaySettings, cosine_directions, pattern_of, sphere_patterns
-from flexpara.bake.tangents import vertex_tangents
+from flexpara.bake.files.images import write_texture
+from flexpara.bake.highpoly.cage import CageSettings
+from flexpara.bake.highpoly.highmaps import HighSource
+from flexpara.bake.highpoly.highmesh import atlas_of
+from flexpara.bake.maps.maps import find_map
+from flexpara.bake.maps.occlusion import ambient_occlusion, starting_points
+from flexpara.bake.maps.rays import BATCH, RayScene, RaySettings, cosine_directions, pattern_of, sphere_patterns
+from flexpara.bake.maps.tangents import vertex_tangents
+from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
+from flexpara.runtime.io.meshwrite import write_ply
 from flexpara.runtime.mesh import Frame
-from flexpara.runtime.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.meshwrite import write_ply
-from flexpara.runtime.packing import atlas_from_uv
-from flexpara.runtime.seams import smooth_normals
+from flexpara.runtime.pack.packing import atlas_from_uv
+from flexpara.runtime.pack.seams import smooth_normals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from flexpara.bake.gbuffer import GBuffer
+    from flexpara.bake.raster.gbuffer import GBuffer
     from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 SHARE_BAR, SECONDS_BAR, ANGLE_BAR = 0.8, 8.0, 2.0

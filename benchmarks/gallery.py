@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexpara.bake.gallery import render_sheet
+from flexpara.bake.pictures.gallery import render_sheet
 from flexpara.runtime.files import write_whole
+from flexpara.runtime.geometry.metrics import measure, uv_charts
+from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.metrics import measure, uv_charts
-from flexpara.runtime.seams import atlas_normals, split_vertices
+from flexpara.runtime.pack.seams import atlas_normals, split_vertices
 
 from .paper import outcomes_of, with_common_options, with_meshes, words
 from .systems import MODES, MULTI_CHART, NAMES

@@ -1,7 +1,8 @@
 """The paper's tables beside a run here: `python -m benchmarks.paper --models DIR [--preset fast] [--systems LIST]`.
 
 Every system unwraps the same cleaned surface in a process of its own and is measured by the same function in the same
-run (`flexpara.runtime.metrics`).  Where a mesh has the name of a model of the paper, the paper's figures stand beside.
+run (`flexpara.runtime.geometry.metrics`).  Where a mesh has the name of a model of the paper, the paper's figures stand
+beside.
 Markdown goes to stdout, progress to stderr, every figure to --json.  A budget that ran out is "incomplete", a system
 that isn't there "not run"; neither gets a number.
 """
@@ -22,8 +23,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexpara.runtime.errors import FlexparaError
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.metrics import measure
+from flexpara.runtime.geometry.metrics import measure
+from flexpara.runtime.io.meshfile import load_asset
 
 from .paper_markdown import READINGS, comparisons, markdown, name_of
 from .systems import ABLATIONS, MODES, MODES_OF, NAMES, Job, Outcome, run

@@ -12,9 +12,9 @@ import moderngl
 import numpy as np
 
 from benchmarks.unwrap import timed
-from flexpara.bake.context import open_context
-from flexpara.bake.gbuffer import WINDOW, DeviceRasterizer
-from flexpara.bake.layout import Layout, Planes, windows
+from flexpara.bake.raster.context import open_context
+from flexpara.bake.raster.gbuffer import WINDOW, DeviceRasterizer
+from flexpara.bake.raster.layout import Layout, Planes, windows
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexpara.runtime.errors import FlexparaError, InputError, MissingDependencyError, MissingFileError
+from flexpara.runtime.geometry.metrics import uv_charts
+from flexpara.runtime.geometry.topology import split_non_manifold_vertices
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.metrics import uv_charts
-from flexpara.runtime.topology import split_non_manifold_vertices
 
 from .peers import PEERS
 
@@ -116,7 +116,7 @@ def by_slim(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -> An
     if seams is None:
         raise InputError(f"no seams of flexpara, {job.mode}, on which slim could start; run flexpara as well")
     try:
-        flatten = import_module("flexpara.train.flatten").flatten
+        flatten = import_module("flexpara.train.finish.flatten").flatten
     except ImportError as error:
         raise MissingDependencyError(f'{error}; pip install "flexpara[train]"') from error
     chart, cut = uv_charts(surface.faces, seams)

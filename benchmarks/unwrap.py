@@ -2,8 +2,8 @@
 
 Every tool unwraps the same cleaned surface and is measured by the same function in the same run.  xatlas and uvunwrap
 are timed by their call, flexpara as a whole process (`flexpara unwrap MESH --maps none`), start-up and all files
-included.  Peak memory is that of the whole process.  Lengths are relative (see `flexpara.runtime.metrics`); seconds are
-the median of --repeat runs.  The bars are those the project has set itself; a row of flexpara names those it misses.
+included.  Peak memory is that of the whole process.  Lengths are relative (see `flexpara.runtime.geometry.metrics`);
+seconds are the median of --repeat runs.  The bars are those the project has set itself; a row of flexpara names those it misses.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.metrics import measure
-from flexpara.runtime.topology import components
+from flexpara.runtime.geometry.metrics import measure
+from flexpara.runtime.geometry.topology import components
+from flexpara.runtime.io.meshfile import load_asset
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

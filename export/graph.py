@@ -15,7 +15,7 @@ from torch import Tensor, nn
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..runtime.bundle import BundleMetadata
+    from ..runtime.sessions.bundle import BundleMetadata
 
 
 class PatchNetworks(Protocol):

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..runtime.bundle import BundleMetadata, nested_placement
 from ..runtime.errors import InputError, ShapeError
+from ..runtime.sessions.bundle import BundleMetadata, nested_placement
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

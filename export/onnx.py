@@ -17,8 +17,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from ..runtime.bundle import METADATA_KEY
 from ..runtime.errors import MissingFileError, ShapeError
+from ..runtime.sessions.bundle import METADATA_KEY
 from .builder import GraphBuilder
 from .graph import UnwrapGraph, chart_membership, fold_frame
 from .lowering import Lowering, Value, cut_to_patch, is_per_patch, trace
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
     from torch import fx
 
-    from ..runtime.bundle import BundleMetadata
     from ..runtime.mesh import Atlas, Charts, Frame
+    from ..runtime.sessions.bundle import BundleMetadata
 
 
 @dataclass(frozen=True)

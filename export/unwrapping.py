@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..runtime.agreement import agreement
+from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Frame, Surface
-from ..runtime.metrics import measure
-from ..runtime.packing import pack
-from ..runtime.session import UnwrapSession
+from ..runtime.pack.packing import pack
+from ..runtime.sessions.agreement import agreement
+from ..runtime.sessions.session import UnwrapSession
 from ..train.config import TrainConfig
 from ..train.paper.config import Ablation, PaperConfig
 from ..train.pipeline import train
@@ -25,11 +25,11 @@ from .onnx import export_onnx
 from .raw import raw_onnx
 
 if TYPE_CHECKING:
-    from ..runtime.cloud import PointCloud
+    from ..runtime.io.cloud import PointCloud
     from ..runtime.mesh import Asset, Atlas, Charts
     from ..runtime.options import Options
     from ..runtime.progress import Clock
-    from ..train.networks import AtlasNetworks
+    from ..train.learn.networks import AtlasNetworks
     from ..train.pipeline import Trained
 
     Keep = tuple[Path, int]
@@ -72,8 +72,8 @@ def train_asset(
     """
     if options.preset != "paper":
         return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
-    from ..train.checkpoint import Checkpoints
     from ..train.paper.batches import PaperInput
+    from ..train.paper.checkpoint import Checkpoints
     from ..train.paper.pipeline import train_paper_surface
 
     samples = None
@@ -144,9 +144,9 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
 
     Raises: ParityError when the exported network and torch disagree.
     """
-    from ..runtime.wrapagreement import inverse_agreement
-    from ..runtime.wrapsession import WrapSession
-    from ..train.fit_wrap import fit_wrap
+    from ..runtime.sessions.wrapagreement import inverse_agreement
+    from ..runtime.sessions.wrapsession import WrapSession
+    from ..train.deploy.fit_wrap import fit_wrap
     from .wrap import export_wrap
 
     ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..runtime.bundle import METADATA_KEY
 from ..runtime.errors import MissingFileError
-from ..runtime.wrapsession import wrap_json
-from ..train.fit_wrap import patch_table
+from ..runtime.sessions.bundle import METADATA_KEY
+from ..runtime.sessions.wrapsession import wrap_json
+from ..train.deploy.fit_wrap import patch_table
 from .builder import GraphBuilder
 from .graph import fold_frame
 from .lowering import Lowering, Value, cut_to_patch, trace
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from torch import fx
 
-    from ..runtime.bundle import BundleMetadata
     from ..runtime.mesh import Atlas, Charts, Frame
+    from ..runtime.sessions.bundle import BundleMetadata
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,15 @@ import torch
 from torch import Tensor, nn
 
 from ..runtime.errors import InputError, ParityError, ShapeError
-from ..train.fit_wrap import patch_table
+from ..train.deploy.fit_wrap import patch_table
 from .graph import fold_frame
 from .parity import largest_difference, load_model, run_model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..runtime.bundle import BundleMetadata
     from ..runtime.mesh import Atlas
+    from ..runtime.sessions.bundle import BundleMetadata
 
 
 class WrapNetworks(Protocol):

@@ -9,19 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .geometry.metrics import measure
+    from .io.meshfile import load_asset
     from .mesh import Asset, Atlas, Charts, Frame, Surface
-    from .meshfile import load_asset
-    from .metrics import measure
-    from .session import UnwrapSession
-    from .wrapsession import WrapSession
+    from .sessions.session import UnwrapSession
+    from .sessions.wrapsession import WrapSession
 
 __all__ = ["Asset", "Atlas", "Charts", "Frame", "Surface", "UnwrapSession", "WrapSession", "load_asset", "measure"]
 
 _HOME = dict.fromkeys(("Asset", "Atlas", "Charts", "Frame", "Surface"), "mesh") | {
-    "UnwrapSession": "session",
-    "WrapSession": "wrapsession",
-    "load_asset": "meshfile",
-    "measure": "metrics",
+    "UnwrapSession": "sessions.session",
+    "WrapSession": "sessions.wrapsession",
+    "load_asset": "io.meshfile",
+    "measure": "geometry.metrics",
 }
 
 

@@ -26,8 +26,8 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
         force: overwrite the file
     """
     from .files import OutputFolder, write_whole
-    from .pointfile import check_output, read_points, write_unwrapped
-    from .session import UnwrapSession
+    from .io.pointfile import check_output, read_points, write_unwrapped
+    from .sessions.session import UnwrapSession
 
     check_output(output)
     OutputFolder(output.parent, output.stem, force=force).check([output.name])
@@ -49,8 +49,8 @@ def evaluate(
     """
     if size is not None:
         Options(size=size)
-    from .meshfile import load
-    from .metrics import measure
+    from .geometry.metrics import measure
+    from .io.meshfile import load
 
     asset = load(mesh)
     if asset.uv is None:

@@ -50,7 +50,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     from flexpara.export import unwrapping
     from flexpara.runtime.mesh import Charts, Frame
     from flexpara.train.config import NetConfig, TrainConfig
-    from flexpara.train.networks import AtlasNetworks
+    from flexpara.train.learn.networks import AtlasNetworks
 
     trained: list[Surface] = []
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import flexpara
-import flexpara.bake.context
+import flexpara.bake.raster.context
 from flexpara import __main__ as cli
 from flexpara.__main__ import main
 

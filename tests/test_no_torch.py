@@ -85,14 +85,14 @@ def test_the_session_is_reached_lazily_and_without_torch(access: str) -> None:
 
 @pytest.mark.parametrize("module", ["torch", "onnx"])
 def test_the_checks_can_fail(module: str) -> None:
-    done = blocked(["flexpara.runtime.session", module])
+    done = blocked(["flexpara.runtime.sessions.session", module])
     assert done.returncode != 0
     assert f"{module} is not installed here" in done.stderr
     assert module in loaded(imports([module]), NOT_FOR_RUNTIME)
 
 
 def test_the_whole_runtime_is_looked_at() -> None:
-    assert {"flexpara.runtime", "flexpara.runtime.session", "flexpara.runtime.mesh"} <= set(RUNTIME)
+    assert {"flexpara.runtime", "flexpara.runtime.sessions.session", "flexpara.runtime.mesh"} <= set(RUNTIME)
 
 
 def test_export_without_onnx_says_how_to_get_it() -> None:

@@ -12,11 +12,11 @@ import numpy as np
 import torch
 
 from ..runtime.mesh import Charts, Frame, Surface
-from .finish import Finished, finish
-from .fit import fit_networks
-from .joint import train_jointly
-from .networks import AtlasNetworks, MultiChartNetworks
-from .patches import split_into_patches
+from .deploy.fit import fit_networks
+from .deploy.patches import split_into_patches
+from .finish.finish import Finished, finish
+from .learn.joint import train_jointly
+from .learn.networks import AtlasNetworks, MultiChartNetworks
 from .sampling import sample_surface
 
 if TYPE_CHECKING:

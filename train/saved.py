@@ -19,7 +19,7 @@ from safetensors import torch as safetensors_torch
 from ..runtime.errors import InputError, MissingFileError
 from ..runtime.mesh import Charts, Frame
 from .config import NetConfig
-from .networks import AtlasNetworks
+from .learn.networks import AtlasNetworks
 from .pipeline import Trained
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from flexpara.bake.context import open_context
+from flexpara.bake.raster.context import open_context
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 Pair = tuple[Atlas, Asset]

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake, make_gbuffer, texture_names, write_textures
-from flexpara.bake.context import open_context
-from flexpara.bake.gbuffer import GBuffer
-from flexpara.bake.images import read_image
-from flexpara.bake.maps import BakeMap, find_map
-from flexpara.bake.tiles import SoftwareWarning
+from flexpara.bake.files.images import read_image
+from flexpara.bake.maps.maps import BakeMap, find_map
+from flexpara.bake.raster.context import open_context
+from flexpara.bake.raster.gbuffer import GBuffer
+from flexpara.bake.raster.tiles import SoftwareWarning
 from flexpara.runtime.errors import InputError, MissingDependencyError
 from flexpara.runtime.mesh import Asset, Atlas
 
@@ -52,7 +52,7 @@ def test_position_of_the_unit_quad_is_exact_to_1e_5(quad: Pair) -> None:
 
 
 def test_no_maps_need_no_context(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.tiles.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", lambda: pytest.fail("opened a context"))
     assert bake(*quad, []) == {}
 
 
@@ -155,7 +155,7 @@ def test_a_bake_leaves_neither_errors_nor_objects_on_the_device(
             assert context.error == "GL_NO_ERROR"
             assert leaks(context) == []
 
-    monkeypatch.setattr("flexpara.bake.tiles.open_context", watched)
+    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", watched)
     bake(*sphere, ["position", "normal", "face-id"], size=50, padding=2, samples=4, limit=40)
     with pytest.raises(InputError, match="uv span"):
         bake(replace(sphere[0], uv=sphere[0].uv * 3), sphere[1], ["position"], size=50)
@@ -190,7 +190,7 @@ def test_without_opengl_numpy_draws_and_says_so(quad: Pair, monkeypatch: pytest.
     def absent() -> None:
         raise MissingDependencyError("no OpenGL 3.3 context could be made: apt-get install libegl1")
 
-    monkeypatch.setattr("flexpara.bake.tiles.open_context", absent)
+    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", absent)
     said: list[str] = []
     expected = bake(*quad, ["position"], size=16, device="software")["position"].pixels
     np.testing.assert_array_equal(bake(*quad, ["position"], size=16, warn=said.append)["position"].pixels, expected)
@@ -257,7 +257,7 @@ def test_a_size_that_cannot_be_drawn_is_refused(quad: Pair, size: int, text: str
 
 
 def test_an_unknown_map_is_refused_before_any_work(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.tiles.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", lambda: pytest.fail("opened a context"))
     with pytest.raises(InputError, match="unknown map 'nope'"):
         bake(*quad, ["position", "nope"])
 

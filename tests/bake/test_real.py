@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake, make_gbuffer
-from flexpara.bake.gltf import write_glb
-from flexpara.bake.preview import preview_pixels
+from flexpara.bake.files.gltf import write_glb
+from flexpara.bake.pictures.preview import preview_pixels
+from flexpara.runtime.geometry.metrics import face_distortion
+from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas, Material
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.metrics import face_distortion
-from flexpara.runtime.packing import atlas_from_uv
+from flexpara.runtime.pack.packing import atlas_from_uv
 
 Pair = tuple[Atlas, Asset]
 

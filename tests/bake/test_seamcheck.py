@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake, chart_labels, make_gbuffer
-from flexpara.bake.images import Texture
+from flexpara.bake.files.images import Texture
 from flexpara.bake.seamcheck import (
     agrees_across_seams,
     bleed_free_mip,
@@ -20,9 +20,9 @@ from flexpara.bake.seamcheck import (
     seam_error,
     seam_report,
 )
+from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.packing import atlas_from_uv
+from flexpara.runtime.pack.packing import atlas_from_uv
 
 Pair = tuple[Atlas, Asset]
 

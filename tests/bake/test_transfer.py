@@ -12,11 +12,11 @@ import pytest
 
 from flexpara.bake.baker import bake, make_gbuffer
 from flexpara.bake.color import srgb_exact
-from flexpara.bake.images import quantize
-from flexpara.bake.material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
-from flexpara.bake.normals import object_normal_map
-from flexpara.bake.tangents import split_by_tangents
-from flexpara.runtime.materials import PbrMaterial, Picture
+from flexpara.bake.files.images import quantize
+from flexpara.bake.maps.material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
+from flexpara.bake.maps.normals import object_normal_map
+from flexpara.bake.maps.tangents import split_by_tangents
+from flexpara.runtime.io.materials import PbrMaterial, Picture
 from flexpara.runtime.mesh import Asset, Atlas
 
 
@@ -106,7 +106,7 @@ def test_the_renders_before_and_after_agree(monkeypatch: pytest.MonkeyPatch, wra
     atlas = split_by_tangents(textured.new_atlas(asset, 4 * SIZE))
     after = rebaked(atlas, asset, 4 * SIZE)
     own = replace(atlas, source_vertex=np.arange(len(atlas.positions)))
-    monkeypatch.setattr("flexpara.bake.resample.SHARPEN", 0.0)  # what looks at the textures filters bilinearly
+    monkeypatch.setattr("flexpara.bake.maps.resample.SHARPEN", 0.0)  # what looks at the textures filters bilinearly
     old, new = renders(atlas, asset, 512), renders(own, after, 512)
     found = {name: psnr(old[name], new[name]) for name in old}
     assert min(found.values()) >= BAR, found

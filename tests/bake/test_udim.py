@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake
-from flexpara.bake.images import read_image
+from flexpara.bake.files.images import read_image
 from flexpara.bake.udim import bake_udim, tile_of, udim_names, udim_tiles, write_udim
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xatlas
 
-from flexpara.runtime.materials import PbrMaterial, Picture
+from flexpara.runtime.io.materials import PbrMaterial, Picture
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 REPEATS = (2, 1)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks import bake
-from flexpara.bake.gbuffer import GBuffer, Planes
-from flexpara.bake.normals import to_tangent_space
-from flexpara.bake.rays import RayScene
+from flexpara.bake.maps.normals import to_tangent_space
+from flexpara.bake.maps.rays import RayScene
+from flexpara.bake.raster.gbuffer import GBuffer, Planes
 from flexpara.runtime.mesh import Frame, Surface
 
 

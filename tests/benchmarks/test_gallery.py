@@ -12,11 +12,11 @@ pytest.importorskip("moderngl")
 
 from benchmarks import gallery, paper
 from benchmarks.systems import Answer, Job, Outcome
-from flexpara.bake.gallery import BAND, COLUMNS, PANEL
-from flexpara.bake.images import read_image
-from flexpara.bake.preview import seam_segments
+from flexpara.bake.files.images import read_image
+from flexpara.bake.pictures.gallery import BAND, COLUMNS, PANEL
+from flexpara.bake.pictures.preview import seam_segments
+from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Surface
-from flexpara.runtime.meshfile import asset_from_arrays
 
 CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0]], np.float64)
 FACES = np.array([[0, 4, 5], [0, 5, 3], [4, 1, 2], [4, 2, 5]])

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from benchmarks import paper
 from benchmarks.paper_markdown import QUANTITIES, beside, comparisons, plain, table
 from benchmarks.systems import Answer, Job, Outcome
+from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.meshfile import asset_from_arrays
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]),

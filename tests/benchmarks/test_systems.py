@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from benchmarks import systems
 from benchmarks.systems import Answer, Job, by_flexpara, in_time, on_shelves, run
 from flexpara.runtime.errors import FinishError, FlexparaError, InputError, MissingFileError
+from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.metrics import measure
 
 
 def bent_sheet(rows: int = 12, columns: int = 18) -> tuple[Surface, NDArray[np.float64]]:

@@ -12,8 +12,8 @@ from torch import Tensor, nn
 
 from flexpara.export.metadata import Provenance, bundle_metadata
 from flexpara.export.parity import probe_points
-from flexpara.runtime.bundle import BundleMetadata
 from flexpara.runtime.mesh import Atlas, Charts, Frame
+from flexpara.runtime.sessions.bundle import BundleMetadata
 
 
 class PlainNetworks(nn.Module):

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 
 from flexpara.export.graph import UnwrapGraph, chart_membership, fold_frame
-from flexpara.runtime.bundle import BundleMetadata
 from flexpara.runtime.mesh import Frame
+from flexpara.runtime.sessions.bundle import BundleMetadata
 
 TWO_CHARTS = BundleMetadata(
     chart_count=2,

@@ -19,10 +19,10 @@ from flexpara.export.graph import UnwrapGraph
 from flexpara.export.metadata import Provenance
 from flexpara.export.onnx import ExportSpec, export_onnx
 from flexpara.export.parity import ParitySpec
-from flexpara.runtime.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.errors import FlexparaError, InputError, MissingFileError, ParityError, ShapeError
+from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
 from flexpara.train.config import NetConfig
-from flexpara.train.networks import AtlasNetworks
+from flexpara.train.learn.networks import AtlasNetworks
 
 MapMaker = Callable[..., Any]
 DENSE = ExportSpec(routed=False)

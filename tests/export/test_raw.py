@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from flexpara.export.metadata import Provenance
 from flexpara.export.raw import MARGIN, raw_atlas, raw_charts, raw_onnx
 from flexpara.runtime.mesh import Frame, Surface
-from flexpara.runtime.session import UnwrapSession
+from flexpara.runtime.sessions.session import UnwrapSession
 from flexpara.train.paper.config import PaperNets
 from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
 

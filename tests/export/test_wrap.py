@@ -18,11 +18,11 @@ from torch import Tensor, nn
 from flexpara.export.metadata import Provenance
 from flexpara.export.wrap import WrapSpec, build_inverse, export_wrap
 from flexpara.export.wrapgraph import WrapGraph, WrapParitySpec, fold_placement, probe_uv, prove_inverse, ties_between
-from flexpara.runtime.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.errors import FlexparaError, InputError, MissingFileError, ParityError, ShapeError
-from flexpara.runtime.wrapsession import WrapSession
+from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
+from flexpara.runtime.sessions.wrapsession import WrapSession
 from flexpara.train.config import WrapConfig
-from flexpara.train.fit_wrap import AtlasWrap
+from flexpara.train.deploy.fit_wrap import AtlasWrap
 from flexpara.train.paper.config import PaperNets
 from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
 

@@ -14,17 +14,17 @@ import trimesh
 
 from flexpara.export.onnx import export_onnx
 from flexpara.export.wrap import export_wrap
+from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Frame, Surface
-from flexpara.runtime.meshfile import asset_from_arrays
-from flexpara.runtime.packing import pack
+from flexpara.runtime.pack.packing import pack
 from flexpara.runtime.samples import make_sample
-from flexpara.runtime.session import UnwrapSession
-from flexpara.runtime.wrapagreement import inverse_agreement
-from flexpara.runtime.wrapsession import WrapSession
+from flexpara.runtime.sessions.session import UnwrapSession
+from flexpara.runtime.sessions.wrapagreement import inverse_agreement
+from flexpara.runtime.sessions.wrapsession import WrapSession
 from flexpara.train.config import FitConfig, NetConfig, PatchConfig
-from flexpara.train.fallback import unwrapped_by_xatlas
-from flexpara.train.fit import fit_networks
-from flexpara.train.fit_wrap import fit_wrap
+from flexpara.train.deploy.fit import fit_networks
+from flexpara.train.deploy.fit_wrap import fit_wrap
+from flexpara.train.finish.fallback import unwrapped_by_xatlas
 from flexpara.train.pipeline import as_charts
 
 

@@ -7,10 +7,10 @@ import sys
 import numpy as np
 import pytest
 
-from flexpara.runtime.cleaning import clean
 from flexpara.runtime.errors import InputError, MissingDependencyError
+from flexpara.runtime.io.cleaning import clean
+from flexpara.runtime.io.rawmesh import RawMesh
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.rawmesh import RawMesh
 from flexpara.runtime.samples import SAMPLES, make_sample
 
 CLOSED = {"sphere": 0, "torus": 1, "trefoil": 1, "cube": 0, "bracket": 5}

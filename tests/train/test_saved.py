@@ -14,7 +14,7 @@ from safetensors import torch as safetensors_torch
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.mesh import Asset, Charts, Frame, Surface
 from flexpara.train.config import NetConfig
-from flexpara.train.networks import AtlasNetworks
+from flexpara.train.learn.networks import AtlasNetworks
 from flexpara.train.pipeline import Trained
 from flexpara.train.saved import read_trained, to_bytes
 

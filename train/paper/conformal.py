@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.distortion import corner_angles
-from ...runtime.overlap import flipped_triangles, signed_areas
-from ..contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
-from ..flatten import CONFORMAL, Slim, slim
+from ...runtime.geometry.distortion import corner_angles
+from ...runtime.geometry.overlap import flipped_triangles, signed_areas
+from ..finish.contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
+from ..finish.flatten import CONFORMAL, Slim, slim
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

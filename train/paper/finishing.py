@@ -19,19 +19,19 @@ import igl
 import numpy as np
 
 from ...runtime.errors import ShapeError
+from ...runtime.geometry.overlap import flipped_triangles, signed_areas
+from ...runtime.geometry.topology import boundary_loops, edge_table, split_non_manifold_vertices
 from ...runtime.mesh import Surface
-from ...runtime.overlap import flipped_triangles, signed_areas
-from ...runtime.topology import boundary_loops, edge_table, split_non_manifold_vertices
 from ..config import FinishConfig
-from ..contact import Relaxed, excess_energy, relax
-from ..disks import cut_open
-from ..finish import Finished, verify
-from ..flatten import circle_map
-from ..labels import connected_pieces, dual_graph
-from ..pieces import Piece, border_length
-from ..regroup import Regrouping
-from ..relief import Flat, Slit, relieve, slit_along
-from ..surrogate import simplified
+from ..finish.contact import Relaxed, excess_energy, relax
+from ..finish.disks import cut_open
+from ..finish.finish import Finished, verify
+from ..finish.flatten import circle_map
+from ..finish.labels import connected_pieces, dual_graph
+from ..finish.pieces import Piece, border_length
+from ..finish.regroup import Regrouping
+from ..finish.relief import Flat, Slit, relieve, slit_along
+from ..finish.surrogate import simplified
 from ..workers import parallel_map
 from .conformal import ConformalConfig, conformal_steps, is_valid
 from .seams import SeamConfig, seam_edges, tears
@@ -39,8 +39,8 @@ from .seams import SeamConfig, seam_edges, tears
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..finish import Stage
-    from ..labels import DualGraph
+    from ..finish.finish import Stage
+    from ..finish.labels import DualGraph
 
 
 @dataclass(frozen=True)

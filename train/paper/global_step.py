@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 from torch import Tensor
 
-from ..losses import cosine_gap, position_gap, weighted_mean
+from ..learn.losses import cosine_gap, position_gap, weighted_mean
 from .losses import angle_gap, box_side, eigenvalue_gap, nearest_gap, repulsion
 from .neighbours import Neighbourhood, own_neighbours
 

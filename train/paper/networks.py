@@ -20,7 +20,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from ..networks import Dense
+from ..learn.networks import Dense
 from .config import PaperNets
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from ...runtime.distortion import corner_angles, edge_lengths
+from ...runtime.geometry.distortion import corner_angles, edge_lengths
+from ...runtime.geometry.metrics import measure
+from ...runtime.geometry.overlap import signed_areas
 from ...runtime.mesh import Charts, Frame, Surface
-from ...runtime.metrics import measure
-from ...runtime.overlap import signed_areas
 from ..config import TrainConfig
-from ..finish import finish
-from ..fit import fit_networks
+from ..deploy.fit import fit_networks
+from ..finish.finish import finish
 from ..pipeline import Progress, Trained, as_charts, in_turn
 from ..sampling import sample_surface
 from .batches import PaperInput
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..checkpoint import Checkpoints
-    from ..finish import Finished
+    from ..finish.finish import Finished
+    from .checkpoint import Checkpoints
     from .config import PaperConfig
     from .networks import PaperNetworks
 

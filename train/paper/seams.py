@@ -20,8 +20,8 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
 from ...runtime.errors import ShapeError
-from ...runtime.topology import EdgeTable, edge_table
-from ..disks import ShortestPaths, disk_cuts, edge_costs, path_mask, prune, shortest_paths, trace_back
+from ...runtime.geometry.topology import EdgeTable, edge_table
+from ..finish.disks import ShortestPaths, disk_cuts, edge_costs, path_mask, prune, shortest_paths, trace_back
 from ..sampling import sample_surface
 
 if TYPE_CHECKING:

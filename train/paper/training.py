@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, cast
 import torch
 
 from ...runtime.errors import FlexparaError, InputError
-from ..checkpoint import State
 from .batches import BatchSource
+from .checkpoint import State
 from .global_step import global_loss
 from .multichart_step import chart_loss
 from .networks import GlobalNetworks, MultiChartPaperNetworks
@@ -23,8 +23,8 @@ from .optimizer import CosineAdamW
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..checkpoint import Checkpoints
     from .batches import PaperInput
+    from .checkpoint import Checkpoints
     from .config import PaperConfig
     from .networks import PaperNetworks
 

@@ -10,7 +10,7 @@ import torch
 
 from flexpara.export.onnx import export_onnx
 from flexpara.runtime.mesh import Atlas, Charts, Frame
-from flexpara.runtime.session import UnwrapSession
+from flexpara.runtime.sessions.session import UnwrapSession
 from flexpara.train.paper.config import PaperNets
 from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import ShapeError
+from flexpara.runtime.geometry.metrics import Metrics, measure
+from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Frame, Surface
-from flexpara.runtime.meshfile import load_asset
-from flexpara.runtime.metrics import Metrics, measure
 from flexpara.runtime.samples import make_sample
-from flexpara.train.contact import excess_energy
-from flexpara.train.disks import is_disk
-from flexpara.train.flatten import slim
+from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.disks import is_disk
+from flexpara.train.finish.flatten import slim
 from flexpara.train.paper.conformal import ConformalConfig, angle_error, conformal_steps, is_valid
 from flexpara.train.paper.finishing import (
     GlobalFinish,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
+from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Charts, Frame, Surface
-from flexpara.runtime.metrics import measure
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FitConfig, TrainConfig
 from flexpara.train.paper.config import PaperConfig, PaperNets

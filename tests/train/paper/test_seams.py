@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import ShapeError
+from flexpara.runtime.geometry.topology import boundary_loops, components, edge_table, euler_characteristic, is_manifold
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.runtime.topology import boundary_loops, components, edge_table, euler_characteristic, is_manifold
-from flexpara.train.disks import cut_open
+from flexpara.train.finish.disks import cut_open
 from flexpara.train.paper.seams import SeamConfig, cut_points, seam_edges, tears
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from torch._subclasses.fake_tensor import FakeTensorMode
 from flexpara.runtime.errors import FlexparaError, InputError
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.checkpoint import Checkpoints
 from flexpara.train.paper import training
 from flexpara.train.paper.batches import BatchSource, PaperInput
+from flexpara.train.paper.checkpoint import Checkpoints
 from flexpara.train.paper.config import Ablation, GlobalWeights, PaperConfig, PaperNets
 from flexpara.train.paper.global_step import global_loss, global_terms
 from flexpara.train.paper.multichart_step import chart_terms
@@ -91,7 +91,7 @@ def test_ten_steps_and_ten_more_equal_twenty(
 
 
 def test_a_kill_between_the_two_files_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from flexpara.train import checkpoint
+    from flexpara.train.paper import checkpoint
 
     samples = surface_input("tube", 16)
     straight = train_paper(samples, SMALL, silent)

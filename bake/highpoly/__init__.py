@@ -1,0 +1,1 @@
+"""The same maps taken from a high-poly surface."""

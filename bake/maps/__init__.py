@@ -1,0 +1,1 @@
+"""Every map is a function of the surface behind each texel."""

@@ -1,0 +1,68 @@
+"""The uv test card: shows stretch, scale, orientation and mirroring wherever it lands on a surface.
+
+16 × 16 labelled cells over [0, 1]²: letter = row from the bottom (v), number = column from the left (u), so that "A1"
+is at the uv origin.
+Hue runs with u, lightness with v; cells alternate light and dark, each holds 4 × 4 finer squares and an arrow along v.
+No symmetry maps the card onto itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..color import linear_from_oklab
+from ..pictures.glyphs import COLUMNS, ROWS, text_mask
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CELLS = 16
+DOTS = 32
+"""Dots per cell side of the drawing of labels."""
+FINE = 4
+
+
+def uv_card(size: int) -> NDArray[np.float32]:
+    """(size, size, 3) float32 linear light: the card sampled at texel centres, row 0 = top (v = 1)."""
+    place = (np.arange(size) + 0.5) / size
+    column, row = np.floor(place * CELLS).astype(int), np.floor((1.0 - place) * CELLS).astype(int)
+    fine_column, fine_row = (
+        np.floor(place * CELLS * FINE).astype(int),
+        np.floor((1.0 - place) * CELLS * FINE).astype(int),
+    )
+    tone = (column[None, :] + row[:, None]) % 2 * 2 + (fine_column[None, :] + fine_row[:, None]) % 2
+    dot_column = np.minimum((place * CELLS * DOTS).astype(int), CELLS * DOTS - 1)
+    ink = _ink()[dot_column[:, None], dot_column[None, :]]
+    tone[ink] = 4
+    return _palette()[tone, row[:, None], column[None, :]]
+
+
+def _palette() -> NDArray[np.float32]:
+    """(5, 16, 16, 3) float32 linear light by tone, row, column.  Tones: two dark, two light, ink."""
+    row, column = np.mgrid[0:CELLS, 0:CELLS] / (CELLS - 1)
+    hue = 2.0 * np.pi * (0.08 + 0.84 * column)
+    tones = []
+    for lightness, chroma in ((0.50, 0.09), (0.53, 0.09), (0.80, 0.075), (0.83, 0.075)):
+        level = lightness + 0.12 * (row - 0.5)
+        tones.append(np.stack([level, chroma * np.cos(hue), chroma * np.sin(hue)], axis=-1))
+    alternate = (np.indices((CELLS, CELLS)).sum(axis=0) % 2).astype(np.float64)
+    ink = np.where(alternate == 0, 0.97, 0.22)
+    tones.append(np.stack([ink, np.zeros_like(ink), np.zeros_like(ink)], axis=-1))
+    return np.clip(linear_from_oklab(np.stack(tones)), 0.0, 1.0).astype(np.float32)
+
+
+def _ink() -> NDArray[np.bool_]:
+    """(16 · DOTS, 16 · DOTS) bool, row 0 = top: the label and the arrow of every cell."""
+    ink = np.zeros((CELLS * DOTS, CELLS * DOTS), np.bool_)
+    arrow = text_mask("↑", scale=1)
+    for row in range(CELLS):
+        for column in range(CELLS):
+            label = text_mask(f"{chr(ord('A') + row)}{column + 1}")
+            top, left = (CELLS - 1 - row) * DOTS, column * DOTS
+            label_top, label_left = top + DOTS - ROWS - 5, left + (DOTS - label.shape[1]) // 2
+            ink[label_top : label_top + ROWS, label_left : label_left + label.shape[1]] = label
+            arrow_left = left + (DOTS - COLUMNS) // 2
+            ink[top + 6 : top + 6 + ROWS, arrow_left : arrow_left + COLUMNS] = arrow
+    return ink

@@ -1,0 +1,1 @@
+"""Pictures for people: the preview, contact sheets."""

@@ -1,0 +1,121 @@
+"""Contact sheets: unwraps one below the other, as papers show them, drawn with the canvas of the preview.
+
+A row is one unwrap: its title, and a panel for each of `COLUMNS`.  Colours are linear light until the file is written.
+uv are v up; a layout is coloured by (n + 1) / 2 of the surface normal n in the space of the mesh, read as sRGB.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.errors import InputError
+from ..color import chart_colors, linear_from_srgb
+from ..files.images import Texture, write_png
+from ..raster.context import open_context
+from .canvas import Camera, Lines, draw, three_quarter_axes
+from .glyphs import ADVANCE, ROWS, text_mask
+from .preview import INK, PAPER, checker_cells, layout, seam_segments, solid
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import moderngl
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Atlas
+
+    Entry = tuple[str, Atlas]
+
+COLUMNS = ("CHECKER", "CHECKER, BACK", "SEAMS", "CHARTS", "UV BY NORMAL", "UV BY CHART")
+PANEL = 420
+SMALLEST_PANEL = 240
+"""Below it the columns' names run into each other."""
+BAND = 44
+"""Pixels above each row for its title, and above the sheet for the columns' names."""
+RED = (0.80, 0.008, 0.008)
+CLAY = 0.55
+"""Linear grey of a shape that shows its seams."""
+
+
+def render_sheet(entries: Sequence[Entry], path: Path, *, pixels: int = PANEL) -> None:
+    """Write a contact sheet as an 8-bit sRGB PNG.  Arguments and errors as `sheet_pixels`."""
+    write_png(Texture(sheet_pixels(entries, pixels=pixels), "srgb", 8, "png"), path)
+
+
+def sheet_pixels(entries: Sequence[Entry], *, pixels: int = PANEL) -> NDArray[np.float32]:
+    """The contact sheet.
+
+    Args:
+        entries: (title, atlas) a row; a title longer than the sheet is wide ends in dots.
+        pixels: side of a panel, 240 or more.
+
+    Returns:
+        (BAND + rows · (BAND + pixels), 6 · pixels, 3) float32 linear light.
+
+    Raises:
+        InputError: no entry, or panels too small for their names.
+        MissingDependencyError: there is no OpenGL.
+    """
+    if not entries:
+        raise InputError("a contact sheet has 0 rows, expected one or more; name at least one unwrap")
+    if pixels < SMALLEST_PANEL:
+        raise InputError(f"panels are {pixels} pixels, expected {SMALLEST_PANEL} or more; leave pixels out")
+    width = len(COLUMNS) * pixels
+    head = np.full((BAND, width, 3), PAPER, np.float32)
+    for number, name in enumerate(COLUMNS):
+        head = written(head, name, number * pixels + (pixels - 2 * ADVANCE * len(name)) // 2, scale=2)
+    rows = [head]
+    with open_context() as context:
+        for title, atlas in entries:
+            band = np.full((BAND, width, 3), PAPER, np.float32)
+            rows.append(written(band, shortened(title, width), 24, scale=3))
+            rows.append(np.concatenate(panels(context, atlas, pixels), axis=1))
+    return np.concatenate(rows, axis=0)
+
+
+def panels(context: moderngl.Context, atlas: Atlas, pixels: int) -> list[NDArray[np.float32]]:
+    """A panel (pixels, pixels, 3) float32 linear light for each of `COLUMNS`."""
+    front = three_quarter_axes()
+    back = front * np.array([-1.0, 1.0, -1.0])
+    views = [Camera.fit(atlas.positions[atlas.faces].reshape(-1, 3), axes) for axes in (front, back)]
+    colors = chart_colors(int(atlas.face_chart.max()) + 1)
+    seams = seam_segments(atlas, atlas.positions)
+    charts = solid(atlas, colors[atlas.face_chart])
+    checkered = replace(charts, cells=checker_cells(atlas))
+    clay = replace(charts, colors=np.full((len(atlas.faces), 3), CLAY, np.float32))
+    by_face = replace(atlas, face_chart=np.arange(len(atlas.faces)))
+    scenes = [
+        (views[0], checkered, Lines(seams, INK, 1.2)),
+        (views[1], checkered, Lines(seams, INK, 1.2)),
+        (views[0], clay, Lines(seams, RED, 2.4)),
+        (views[0], charts, Lines(seams, INK, 1.2)),
+        layout(by_face, normal_colors(atlas)),
+        layout(atlas, colors),
+    ]
+    return [draw(context, *scene, pixels=pixels, paper=PAPER) for scene in scenes]
+
+
+def normal_colors(atlas: Atlas) -> NDArray[np.float32]:
+    """(f, 3) float32 linear light: (n + 1) / 2 of the mean of each face's corner normals, read as sRGB."""
+    mean = atlas.normals[atlas.faces].astype(np.float64).mean(axis=1)
+    unit = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
+    return linear_from_srgb((unit + 1.0) / 2.0).astype(np.float32)
+
+
+def shortened(title: str, width: int) -> str:
+    """The title as far as a band of that many pixels holds it at scale 3, a margin left and right."""
+    most = (width - 48) // (3 * ADVANCE)
+    return title if len(title) <= most else f"{title[: most - 3]}..."
+
+
+def written(band: NDArray[np.float32], text: str, left: int, *, scale: int) -> NDArray[np.float32]:
+    """The band with a line of text in mid height from pixel column `left`; letters are 7 · scale pixels high."""
+    mask = text_mask(text, scale=scale)
+    top = (len(band) - ROWS * scale) // 2
+    result = band.copy()
+    result[top : top + mask.shape[0], left : left + mask.shape[1]][mask] = linear_from_srgb(np.full(3, 0.25))
+    return result

@@ -1,0 +1,136 @@
+"""Mesh file → Asset.
+
+OBJ and glTF have readers of their own (order, uv and materials stay as they stand); all else goes through trimesh with
+its processing off.  Positions are float64 in the units of the file; face i of the file is face i until cleaning drops
+some.  Triangles of other formats keep their order; quads become two triangles in the order that trimesh gives them.
+A file may come from anyone: it reaches nothing outside its folder, no network, and no pickle.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import MeshError, MissingFileError, ShapeError
+from ..mesh import Asset
+from .cleaning import clean
+from .cloudfile import is_cloud
+from .gltffile import read_gltf
+from .materials import read_in_folder
+from .objfile import read_obj
+from .rawmesh import RawMesh, as_rgba, unit_vectors
+
+if TYPE_CHECKING:
+    import trimesh
+    from numpy.typing import ArrayLike, NDArray
+
+    MeshLike = str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike]
+
+MAX_BYTES = 8 << 30
+
+
+def load_asset(path: Path) -> Asset:
+    """Read and clean a mesh file.
+
+    Args:
+        path: obj, ply, stl, glb, gltf, off, or another format that trimesh reads.
+
+    Returns:
+        The Asset; its changes say what cleaning did and what could not be kept.
+
+    Raises:
+        MissingFileError: nothing lies there.
+        MeshError: no mesh, an unknown extension, damaged, empty, points only, not finite, all faces degenerate.
+        MissingDependencyError: trimesh reads this format with a package that is absent.
+    """
+    if path.is_dir():
+        raise MeshError(f"{path} is a folder, expected a mesh file; name the file in it")
+    if not path.is_file():
+        raise MissingFileError(f"{path} does not exist, expected a mesh file; check the path")
+    if path.stat().st_size > MAX_BYTES:
+        raise MeshError(f"{path} has {path.stat().st_size} bytes, at most {MAX_BYTES} are read; decimate the mesh")
+    if is_cloud(path):
+        raise MeshError(
+            f"{path} holds points and no faces, expected triangles; flexpara unwrap takes point clouds, "
+            "for all else give a triangle mesh"
+        )
+    data = path.read_bytes()
+    try:
+        return clean(_read(data, path), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from error
+
+
+def load(mesh: MeshLike) -> Asset:
+    """The mesh as an Asset, cleaned.  Raises: InputError when it is no mesh, or one with nothing to unwrap."""
+    if isinstance(mesh, str | Path):
+        return load_asset(Path(mesh))
+    if isinstance(mesh, tuple):
+        return asset_from_arrays(*mesh)
+    visual: Any = mesh.visual
+    colors = visual.vertex_colors if visual.kind == "vertex" else None
+    return asset_from_arrays(mesh.vertices, mesh.faces, colors=colors, uv=getattr(visual, "uv", None))
+
+
+def asset_from_arrays(
+    positions: ArrayLike,
+    faces: ArrayLike,
+    *,
+    normals: ArrayLike | None = None,
+    colors: ArrayLike | None = None,
+    uv: ArrayLike | None = None,
+    stem: str = "mesh",
+) -> Asset:
+    """Clean a mesh that is already in memory.
+
+    Args:
+        positions: (n, 3) finite numbers, source units.
+        faces: (f, 3) integers into positions.
+        normals: (n, 3), made unit, or None.
+        colors: (n, 3 or 4), uint8 sRGB, or float sRGB in [0, 1], or None.
+        uv: (n, 2), v up, or None.
+        stem: base name for outputs.
+
+    Raises:
+        ShapeError: an array of another shape or kind.
+        MeshError: as load_asset.
+    """
+    points = _array("positions", positions, (3,), "iuf").astype(np.float64)
+    corners = _array("faces", faces, (3,), "iu").astype(np.int64)
+    count = len(points)
+    raw = RawMesh(
+        positions=points,
+        faces=corners,
+        normals=None
+        if normals is None
+        else unit_vectors(_array("normals", normals, (3,), "iuf", count).astype(np.float64)),
+        colors=None if colors is None else as_rgba(_array("colors", colors, (3, 4), "uf", count)),
+        uv=None if uv is None else _array("uv", uv, (2,), "iuf", count).astype(np.float64),
+    )
+    return clean(raw, stem=stem)
+
+
+def _array(name: str, values: ArrayLike, columns: tuple[int, ...], kinds: str, rows: int | None = None) -> NDArray[Any]:
+    array = np.asarray(values)
+    right = array.ndim == 2 and array.shape[1] in columns and array.dtype.kind in kinds and rows in (None, len(array))
+    if not right:
+        expected = f"({'n' if rows is None else rows}, {' or '.join(map(str, columns))})"
+        kind = "integers" if kinds == "iu" else "numbers"
+        raise ShapeError(
+            f"{name} has shape {array.shape} and dtype {array.dtype}, expected {expected} {kind}; convert it"
+        )
+    return array
+
+
+def _read(data: bytes, path: Path) -> RawMesh:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind == "obj":
+        return read_obj(data, lambda name: read_in_folder(path.parent, name))
+    if kind in ("glb", "gltf"):
+        return read_gltf(data, path.parent)
+    from .trimeshfile import read_with_trimesh  # the two formats above do without trimesh, whose import takes 0.6 s
+
+    return read_with_trimesh(data, path)

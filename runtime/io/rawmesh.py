@@ -1,0 +1,187 @@
+"""Triangles as a file holds them: what readers return and cleaning takes.
+
+n file vertices · f faces.  Positions are float64 in source units, uv is v up, colours are uint8 sRGB.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import MeshError, ShapeError
+from ..mesh import Material
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+LARGEST_DIAGONAL = 1e100  # beyond, areas leave the range of float64
+MAX_FACES = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """One mesh or one part of it, unchecked.
+
+    positions: (n, 3) float64.  faces: (f, 3) int64 into positions.  normals: (n, 3) float64 or None.
+    colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
+    face_material: (f,) int64 into materials, or None.  changes: what reading could not keep, name → count.
+    """
+
+    positions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    normals: NDArray[np.float64] | None = None
+    colors: NDArray[np.uint8] | None = None
+    uv: NDArray[np.float64] | None = None
+    materials: tuple[Material, ...] = ()
+    face_material: NDArray[np.int64] | None = None
+    changes: dict[str, int] = field(default_factory=dict)
+
+
+def check(raw: RawMesh) -> None:
+    """Refuse what can't be a surface.
+
+    Raises: MeshError for no faces, too many, indices out of range, coordinates that are not finite or out of range.
+    """
+    vertex_count, face_count = len(raw.positions), len(raw.faces)
+    if vertex_count == 0 or face_count == 0:
+        raise MeshError(
+            f"the mesh is empty ({vertex_count} vertices, {face_count} faces), expected triangles; check the export"
+        )
+    if face_count > MAX_FACES:
+        raise MeshError(f"{face_count} faces, at most {MAX_FACES} are read; decimate the mesh or split it")
+    outside = ((raw.faces < 0) | (raw.faces >= vertex_count)).any(axis=1)
+    if outside.any():
+        first = int(np.argmax(outside))
+        raise MeshError(
+            f"face {first} refers to vertices {raw.faces[first].tolist()}, expected 0 to {vertex_count - 1}; "
+            "the mesh is damaged: export it again"
+        )
+    broken = ~np.isfinite(raw.positions).all(axis=1)
+    if broken.any():
+        raise MeshError(
+            f"{np.count_nonzero(broken)} of {vertex_count} vertices have NaN or infinite coordinates (first: vertex "
+            f"{int(np.argmax(broken))}), expected finite numbers; delete or repair them"
+        )
+    largest = float(np.abs(raw.positions).max())
+    if largest > LARGEST_DIAGONAL:
+        raise MeshError(f"coordinates reach {largest:.3g}, expected at most {LARGEST_DIAGONAL:g}; choose another unit")
+
+
+def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
+    """The part under a (4, 4) matrix for column vectors; a mirroring one turns the winding: outside stays outside."""
+    linear = world[:3, :3]
+    mirrored = bool(np.linalg.det(linear) < 0.0)
+    normals = None
+    if part.normals is not None:
+        cofactor = np.stack([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
+        turned = part.normals @ (-cofactor if mirrored else cofactor).T
+        normals = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    return replace(
+        part,
+        positions=part.positions @ linear.T + world[:3, 3],
+        faces=part.faces[:, [0, 2, 1]] if mirrored else part.faces,
+        normals=normals,
+    )
+
+
+def split_at_corners(part: RawMesh, corner_uv: NDArray[np.float64]) -> RawMesh:
+    """The part with uv given per corner (f, 3, 2): vertices are split where their uv differ, in vertex order."""
+    vertex, uv = part.faces.ravel(), corner_uv.reshape(-1, 2)
+    order = np.lexsort((uv[:, 1], uv[:, 0], vertex))
+    differs = (np.diff(vertex[order]) != 0) | (np.diff(uv[order], axis=0) != 0).any(axis=1)
+    first = np.concatenate([[True], differs])
+    faces = np.zeros(len(vertex), dtype=np.int64)
+    faces[order] = np.cumsum(first) - 1
+    source = vertex[order][first]
+    return replace(
+        part,
+        positions=part.positions[source],
+        faces=faces.reshape(-1, 3),
+        normals=None if part.normals is None else part.normals[source],
+        colors=None if part.colors is None else part.colors[source],
+        uv=uv[order][first],
+    )
+
+
+def merge(parts: Sequence[RawMesh]) -> RawMesh:
+    """All parts as one mesh, in their order; equal Material objects become one.
+
+    Where only some parts have uv or colours, the others get (0, 0) and white; where only some have normals, none are
+    kept.  Each of these is counted in changes.
+    """
+    offsets = np.cumsum([0, *(len(part.positions) for part in parts)])
+    materials, face_material = _joined_materials(parts)
+    changes: dict[str, int] = {}
+    for part in parts:
+        for name, count in part.changes.items():
+            changes[name] = changes.get(name, 0) + count
+    has_normals = all(part.normals is not None for part in parts)
+    if not has_normals:
+        changes["dropped_normals"] = sum(len(part.normals) for part in parts if part.normals is not None)
+    return RawMesh(
+        positions=np.concatenate([part.positions for part in parts]),
+        faces=np.concatenate([part.faces + start for part, start in zip(parts, offsets[:-1], strict=True)]),
+        normals=np.concatenate([part.normals for part in parts if part.normals is not None]) if has_normals else None,
+        colors=_joined_colors(parts, changes),
+        uv=_joined_uv(parts, changes),
+        materials=materials,
+        face_material=face_material,
+        changes=changes,
+    )
+
+
+def _joined_colors(parts: Sequence[RawMesh], changes: dict[str, int]) -> NDArray[np.uint8] | None:
+    if all(part.colors is None for part in parts):
+        return None
+    changes["faces_without_colors"] = sum(len(part.faces) for part in parts if part.colors is None)
+    white = [np.full((len(part.positions), 4), 255, dtype=np.uint8) for part in parts]
+    return np.concatenate(
+        [plain if part.colors is None else part.colors for part, plain in zip(parts, white, strict=True)]
+    )
+
+
+def _joined_uv(parts: Sequence[RawMesh], changes: dict[str, int]) -> NDArray[np.float64] | None:
+    if all(part.uv is None for part in parts):
+        return None
+    missing = sum(len(part.faces) for part in parts if part.uv is None)
+    changes["faces_without_uv"] = changes.get("faces_without_uv", 0) + missing
+    return np.concatenate([np.zeros((len(part.positions), 2)) if part.uv is None else part.uv for part in parts])
+
+
+def _joined_materials(
+    parts: Sequence[RawMesh],
+) -> tuple[tuple[Material, ...], NDArray[np.int64] | None]:
+    """Each Material object once, and the (f,) one of each face; parts without any share a default one, the last."""
+    materials = list({id(material): material for part in parts for material in part.materials}.values())
+    if not materials:
+        return (), None
+    place = {id(material): index for index, material in enumerate(materials)}
+    columns = []
+    for part in parts:
+        own = np.array([place[id(material)] for material in part.materials], dtype=np.int64)
+        bare = np.full(len(part.faces), len(materials), dtype=np.int64)
+        columns.append(bare if part.face_material is None else own[part.face_material])
+    if any(part.face_material is None for part in parts):
+        materials.append(Material(name="default"))
+    return tuple(materials), np.concatenate(columns)
+
+
+def unit_vectors(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows of unit length (a zero row stays zero, not-finite numbers become zero)."""
+    finite = np.nan_to_num(vectors, posinf=0.0, neginf=0.0)
+    return finite / np.maximum(np.linalg.norm(finite, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+
+
+def as_rgba(colors: NDArray[Any]) -> NDArray[np.uint8]:
+    """(n, 3 or 4) uint8, or float in [0, 1] → (n, 4) uint8; a missing alpha is opaque."""
+    if colors.dtype.kind == "f":
+        colors = np.rint(np.clip(np.nan_to_num(colors), 0.0, 1.0) * 255.0)
+    elif colors.dtype != np.uint8:
+        raise ShapeError(f"colors have dtype {colors.dtype}, expected uint8, or float in [0, 1]; convert them")
+    opaque = np.full((len(colors), 4), 255, dtype=np.uint8)
+    opaque[:, : colors.shape[1]] = colors
+    return opaque

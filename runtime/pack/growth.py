@@ -1,0 +1,169 @@
+"""Placed charts grow and move until they are jammed: what a coarse grid left free becomes texels.
+
+k charts · s outline segments · p pairs of segments that face each other.  All charts keep one common scale; distances
+are those of the outlines themselves.  Each step is a linear program in the charts' shifts and the growth of the common
+scale: to first order, the distance of two outlines changes by the motion along the line of their closest points
+(compaction of nested polygons, Li and Milenkovic 1995).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import coo_array, vstack
+
+from ..errors import FinishError
+from ..geometry.gaps import closest_points, facing_segments, segment_distance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from scipy.sparse import csr_array
+
+_ROUNDS = 3
+_STEPS = 4
+_CALMER = 0.75
+_MOST_REPAIRS = 40
+_REACH = 1.0 / 8.0
+_TRUST = 1.0 / 128.0
+_SAMPLE = 1.0 / 1024.0
+
+
+def apply_placement(
+    placement: NDArray[np.float64], face_chart: NDArray[np.int64], corner_uv: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Chart coordinates (f, 3, 2) → atlas uv (f, 3, 2) by placement (k, 2, 3); equal in, equal out, bit by bit."""
+    matrix = placement[face_chart][:, None]
+    x, y = corner_uv[..., 0], corner_uv[..., 1]
+    return np.stack([matrix[..., i, 0] * x + matrix[..., i, 1] * y + matrix[..., i, 2] for i in (0, 1)], axis=-1)
+
+
+def grown(
+    placement: NDArray[np.float64], outlines: list[NDArray[np.float64]], size: int, padding: int
+) -> NDArray[np.float64]:
+    """The placement (k, 2, 3) with charts shifted and grown as far as the padding allows; never turned or mirrored.
+
+    Distances keep a few float32 steps more than the padding, so that rounding doesn't undercut it.
+
+    Args:
+        placement: (k, 2, 3) float64, chart coordinates → atlas uv, with the padding kept.
+        outlines: per chart its outline segments (s, 2, 2) float64 in chart coordinates.
+        size: texels per side.
+        padding: texels.
+
+    Raises:
+        FinishError: the padding was not kept to begin with and cannot be restored.
+    """
+    chart = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
+    segments = apply_placement(placement, chart, np.concatenate(outlines))
+    parts = np.split(segments, np.cumsum([len(outline) for outline in outlines])[:-1])
+    box = np.array([(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for part in parts])
+    centre = box.mean(axis=1)
+    border, apart = padding / size + 2.0**-23, 2.0 * padding / size + 2.0**-22
+    fit = (1.0 - 2.0 * border) / float(np.ptp(box.reshape(-1, 2), axis=0).max())
+    fitted = border + fit * (centre - box.reshape(-1, 2).min(axis=0))
+    crowd = _Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
+    trust = _TRUST / max(1.0, math.sqrt(len(outlines) / 24.0))
+    for number in range(_ROUNDS):
+        pairs = facing_segments(crowd.segments(), chart, spacing=_SAMPLE, reach=_REACH)
+        for step in range(_STEPS):
+            crowd = _step(crowd, pairs, border, apart, trust * _CALMER ** (number * _STEPS + step))
+    crowd = _settled(crowd, border, apart)
+    linear, shift = placement[:, :, :2] * crowd.factor, (placement[:, :, 2] - centre) * crowd.factor + crowd.centre
+    return np.concatenate([linear, shift[:, :, None]], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crowd:
+    """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2)."""
+
+    local: NDArray[np.float64]
+    chart: NDArray[np.int64]
+    half: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    factor: float
+
+    def segments(self) -> NDArray[np.float64]:
+        return self.centre[self.chart][:, None] + self.factor * self.local
+
+
+def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, trust: float) -> _Crowd:
+    """One linear program: the largest growth of the factor, shifts and growth of a box within trust (uv units).
+
+    Two outlines then come closer by 4·√2·trust at most, so pairs with more room than that are left out.
+    """
+    rows, room = _pair_rows(crowd, pairs, apart)
+    near = room <= 6.0 * trust
+    k = len(crowd.centre)
+    walls, wall_room = _wall_rows(crowd, border)
+    growth = trust / float(crowd.half.max())
+    limits = [(-trust, trust)] * (2 * k) + [(-growth, growth)]
+    objective = np.zeros(2 * k + 1)
+    objective[-1] = -1.0
+    found = linprog(
+        objective, A_ub=vstack([rows[near], walls]), b_ub=np.concatenate([room[near], wall_room]), bounds=limits
+    )
+    if found.status != 0:
+        return crowd
+    return replace(crowd, centre=crowd.centre + found.x[:-1].reshape(k, 2), factor=crowd.factor + float(found.x[-1]))
+
+
+def _pair_rows(crowd: _Crowd, pairs: NDArray[np.int64], apart: float) -> tuple[csr_array, NDArray[np.float64]]:
+    """Per pair of segments (p, 2): how much its distance shrinks with (x and y shifts, growth), and how much it may."""
+    segments = crowd.segments()
+    one, two = closest_points(segments[pairs[:, 0]], segments[pairs[:, 1]])
+    distance = np.linalg.norm(two - one, axis=1)
+    toward = (two - one) / np.maximum(distance, 1e-300)[:, None]
+    first, second = crowd.chart[pairs].T
+    spread = ((two - crowd.centre[second]) - (one - crowd.centre[first])) / crowd.factor
+    number, last = np.arange(len(pairs)), 2 * len(crowd.centre)
+    columns = [2 * first, 2 * first + 1, 2 * second, 2 * second + 1, np.full(len(pairs), last)]
+    values = [toward[:, 0], toward[:, 1], -toward[:, 0], -toward[:, 1], -(toward * spread).sum(axis=1)]
+    entries = (np.concatenate(values), (np.tile(number, 5), np.concatenate(columns)))
+    return coo_array(entries, shape=(len(pairs), last + 1)).tocsr(), distance - apart
+
+
+def _wall_rows(crowd: _Crowd, border: float) -> tuple[csr_array, NDArray[np.float64]]:
+    """The same for the four sides of the square: 4·k rows."""
+    half, centre = crowd.half.reshape(-1), crowd.centre.reshape(-1)
+    number, last = np.arange(len(half)), np.full(len(half), len(half))
+    values = np.concatenate([np.ones(len(half)), -np.ones(len(half)), half, half])
+    rows = np.concatenate([number, number + len(half), number, number + len(half)])
+    columns = np.concatenate([number, number, last, last])
+    room = np.concatenate([1.0 - border - centre - crowd.factor * half, centre - border - crowd.factor * half])
+    return coo_array((values, (rows, columns))).tocsr(), room
+
+
+def _settled(crowd: _Crowd, border: float, apart: float) -> _Crowd:
+    """The crowd with the largest factor that keeps all distances exactly, charts where they are."""
+    room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
+    walls = float((room / np.maximum(crowd.half, 1e-300)).min())
+    pairs = facing_segments(crowd.segments(), crowd.chart, spacing=_SAMPLE, reach=_REACH)
+    for _ in range(_MOST_REPAIRS):
+        crowd = replace(crowd, factor=_largest_factor(crowd, pairs, apart, walls))
+        closest = facing_segments(crowd.segments(), crowd.chart, spacing=_SAMPLE, reach=_SAMPLE)
+        if _free(crowd, closest, apart):
+            return crowd
+        pairs = np.concatenate([pairs, closest])
+    raise FinishError(
+        f"charts stay closer than {apart:.3g} of the atlas side after {_MOST_REPAIRS} repairs; please report"
+    )
+
+
+def _largest_factor(crowd: _Crowd, pairs: NDArray[np.int64], apart: float, walls: float) -> float:
+    """Largest factor up to walls, and 1.25 times the crowd's own, at which pairs (p, 2) of segments stay apart."""
+    low, high = 0.0, min(walls, 1.25 * crowd.factor)
+    if _free(replace(crowd, factor=high), pairs, apart):
+        return high
+    for _ in range(40):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if _free(replace(crowd, factor=middle), pairs, apart) else (low, middle)
+    return low
+
+
+def _free(crowd: _Crowd, pairs: NDArray[np.int64], apart: float) -> bool:
+    segments = crowd.segments()
+    return not bool((segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]) < apart).any())

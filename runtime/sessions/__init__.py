@@ -1,0 +1,1 @@
+"""The ONNX files answered without torch: uv and chart of a point, point and normal of a uv; how well both agree."""

@@ -1,0 +1,88 @@
+"""Pictures and names beside a mesh: decoding, limits, and nothing outside the folder."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.materials import PbrMaterial, decode_image, linear_to_srgb, read_in_folder, read_mtl
+
+
+def png(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="PNG")
+    return stream.getvalue()
+
+
+def test_every_kind_of_picture_becomes_rgba() -> None:
+    grey = np.array([[0, 128], [255, 7]], dtype=np.uint8)
+    decoded = decode_image(png(grey))
+    assert decoded.shape == (2, 2, 4)
+    np.testing.assert_array_equal(decoded[:, :, 0], grey)
+    np.testing.assert_array_equal(decoded[:, :, 3], 255)
+
+
+def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = png(np.random.default_rng(0).integers(0, 256, (64, 64, 4)).astype(np.uint8))
+    with pytest.raises(MeshError, match="damaged"):
+        decode_image(whole[: len(whole) // 2])
+    with pytest.raises(MeshError, match="no readable picture"):
+        decode_image(b"GIF?")
+    monkeypatch.setattr("flexpara.runtime.io.materials.MAX_PIXELS", 64 * 64 - 1)
+    with pytest.raises(MeshError, match="64 × 64 pixels"):
+        decode_image(whole)
+
+
+def test_names_reach_only_files_of_the_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "in"
+    (folder / "sub").mkdir(parents=True)
+    for path in (tmp_path / "out.png", folder / "in.png", folder / "sub" / "deep.png"):
+        path.write_text(path.name)
+    (folder / "link.png").symlink_to(tmp_path / "out.png")
+    assert read_in_folder(folder, " in.png ") == b"in.png"
+    assert read_in_folder(folder, "sub/deep.png") == b"deep.png"
+    assert read_in_folder(folder, "D:\\art\\in.png") == b"in.png"
+    for name in ("../out.png", str(tmp_path / "out.png"), "link.png", "", ".", "..", "sub", "gone.png"):
+        assert read_in_folder(folder, name) is None
+
+
+def test_a_material_library_gives_factors_and_counts_missing_pictures() -> None:
+    text = b"junk 1\nnewmtl a b\nKd 0.25\nnewmtl c\nKd 2 -1 0.5\nmap_Kd gone.png\n"
+    materials, missing = read_mtl(text, lambda _: None)
+    assert missing == 1
+    assert materials["a b"].base_color_factor == (0.25, 0.25, 0.25, 1.0)
+    assert materials["c"].base_color_factor == (1.0, 0.0, 0.5, 1.0)
+    with pytest.raises(MeshError, match="no numbers"):
+        read_mtl(b"newmtl a\nKd red\n", lambda _: None)
+
+
+def test_the_srgb_curve_has_its_known_points_and_no_jump() -> None:
+    np.testing.assert_allclose(linear_to_srgb(np.array([0.0, 1.0, 0.5])), [0.0, 1.0, 0.735356983052], atol=1e-12)
+    knee = linear_to_srgb(np.array([0.0031308 - 1e-9, 0.0031308 + 1e-9]))
+    assert abs(np.diff(knee)[0]) < 1e-6
+
+
+def test_physically_based_lines_and_clamping_are_read() -> None:
+    stream = io.BytesIO()
+    Image.new("RGBA", (2, 2), (9, 8, 7, 128)).save(stream, "PNG")
+    text = b"newmtl a\nmap_Kd -clamp on a.png\nnorm n.png\nmap_Ke gone.png\nKe 0.5\nPm 1\nPr 0.25\n"
+    materials, missing = read_mtl(text, lambda name: None if name == "gone.png" else stream.getvalue())
+    material = materials["a"]
+    assert isinstance(material, PbrMaterial)
+    assert missing == 1
+    assert set(material.pictures) == {"base-color", "normal"}
+    assert material.pictures["base-color"].wrap == ("clamp", "clamp")
+    assert material.pictures["normal"].wrap == ("repeat", "repeat")
+    assert (material.metallic, material.roughness, material.emissive) == (1.0, 0.25, (0.5, 0.5, 0.5))
+    assert material.alpha_mode == "BLEND"
+
+
+@pytest.mark.parametrize("line", [b"Ke red", b"Pm nan", b"Pr inf"])
+def test_factors_that_are_no_numbers_are_refused(line: bytes) -> None:
+    with pytest.raises(MeshError, match="no numbers"):
+        read_mtl(b"newmtl a\n" + line + b"\n", lambda _: None)

@@ -1,0 +1,158 @@
+"""OBJ: face i of the file is face i of the mesh, whatever the materials, quads and relative indices."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.objfile import read_obj
+from flexpara.runtime.io.rawmesh import RawMesh
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+def nothing(_: str) -> bytes | None:
+    return None
+
+
+def read(text: str, siblings: Callable[[str], bytes | None] = nothing) -> RawMesh:
+    return read_obj(text.encode(), siblings)
+
+
+def corners(raw: RawMesh) -> list[list[list[float]]]:
+    return raw.positions[raw.faces].tolist()
+
+
+def test_one_triangle() -> None:
+    raw = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    np.testing.assert_array_equal(raw.positions, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
+    assert (raw.uv, raw.normals, raw.colors, raw.face_material) == (None, None, None, None)
+
+
+def test_polygons_become_fans_in_their_place() -> None:
+    raw = read(SQUARE + "v 2 0 0\nf 1 2 3 4\nf 2 5 3\nf 1 2 5 3 4\n")
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2], [0, 2, 3], [1, 4, 2], [0, 1, 4], [0, 4, 2], [0, 2, 3]])
+
+
+def test_relative_indices_count_back_from_their_own_line() -> None:
+    raw = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1\n")
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2], [3, 4, 5]])
+
+
+def test_vertices_split_only_where_uv_differ_and_stay_in_file_order() -> None:
+    raw = read(SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 0.5 0.5\nf 1/1 2/2 3/3\nf 1/1 3/5 4/4\n")
+    assert raw.uv is not None
+    np.testing.assert_array_equal(raw.positions[:, :2], [[0, 0], [1, 0], [1, 1], [1, 1], [0, 1]])
+    np.testing.assert_array_equal(raw.uv[raw.faces], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [0.5, 0.5], [0, 1]]])
+
+
+def test_normals_are_read_with_and_without_uv() -> None:
+    for corner in ("{0}//1", "{0}/1/1"):
+        face = "f " + " ".join(corner.format(i) for i in (1, 2, 3))
+        raw = read(f"{SQUARE}vt 0.25 0.75\nvn 0 0 1\n{face}\n")
+        assert raw.normals is not None
+        np.testing.assert_array_equal(raw.normals[raw.faces], np.tile([0.0, 0.0, 1.0], (1, 3, 1)))
+
+
+def test_normals_on_some_corners_only_are_no_normals() -> None:
+    assert read(f"{SQUARE}vn 0 0 1\nf 1//1 2//1 3//1\nf 1 3 4\n").normals is None
+
+
+def test_faces_without_uv_among_others_are_counted() -> None:
+    raw = read(f"{SQUARE}vt 0.5 0.5\nf 1/1 2/1 3/1\nf 1 3 4\n")
+    assert raw.uv is not None
+    assert raw.changes == {"faces_without_uv": 1}
+    np.testing.assert_array_equal(raw.uv[raw.faces[1]], np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize("scale", [1.0, 255.0])
+def test_vertex_colours_are_read_in_both_ranges(scale: float) -> None:
+    rows = [(0, 0, 0, 1, 0, 0), (1, 0, 0, 0, 0.2, 0), (0, 1, 0, 0, 0, 1)]
+    text = "".join(f"v {x} {y} {z} {r * scale} {g * scale} {b * scale}\n" for x, y, z, r, g, b in rows)
+    raw = read(text + "f 1 2 3\n")
+    np.testing.assert_array_equal(raw.colors, [[255, 0, 0, 255], [0, 51, 0, 255], [0, 0, 255, 255]])
+
+
+def test_untidy_text_is_read() -> None:
+    raw = read(
+        "# made by hand\r\n  v\t0 0 0 # origin\r\nv 1e0 0 0\r\nv 0 1 0\r\n\r\ng a b\r\ns off\r\nf 1 \\\r\n 2 3 # last"
+    )
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
+
+
+def test_materials_keep_the_order_of_the_faces() -> None:
+    library = b"newmtl red\nKd 1 0 0\nd 0.5\nnewmtl blue\nKd 0 0 1\nnewmtl unused\nKd 0 1 0\n"
+    text = f"mtllib a.mtl\n{SQUARE}f 1 2 3\nusemtl blue\nf 1 3 4\nusemtl red\nf 1 2 4\nusemtl blue\nf 2 3 4\n"
+    raw = read(text, {"a.mtl": library}.get)
+    assert raw.face_material is not None
+    names = [raw.materials[index].name for index in raw.face_material]
+    assert names == ["default", "blue", "red", "blue"]
+    factors = {material.name: material.base_color_factor for material in raw.materials}
+    assert factors == {"default": (1, 1, 1, 1), "blue": (0, 0, 1, 1), "red": (1, 0, 0, 0.5)}
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+
+
+def test_a_texture_is_read_with_row_0_on_top() -> None:
+    pixels = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="PNG")
+    files = {"a.mtl": b"newmtl m\nKd 0.1 0.1 0.1\nmap_Kd -s 1 1 1 skin.png\n", "skin.png": stream.getvalue()}
+    raw = read(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", files.get)
+    np.testing.assert_array_equal(raw.materials[0].base_color, pixels)
+    assert raw.materials[0].base_color_factor == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_what_is_missing_is_counted() -> None:
+    raw = read(
+        f"mtllib a.mtl b.mtl\nmtllib gone.mtl\n{SQUARE}usemtl m\nf 1 2 3\n",
+        {"a.mtl b.mtl": b"newmtl m\nmap_Kd x.png"}.get,
+    )
+    assert raw.changes == {"missing_materials": 1, "missing_textures": 1}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no face"),
+        ("hello", "no face"),
+        (SQUARE, "points and no faces"),
+        (f"{SQUARE}f 1 2\n", "face 0 has 2 corners"),
+        (f"{SQUARE}f 1 2 5\n", "face 0 refers to 'v' number 5, expected 1 to 4"),
+        (f"{SQUARE}f 1 2 3\nf 0 1 2\n", "face 1 refers to 'v' number 0"),
+        (f"{SQUARE}f 1 2 -5\n", "number -5"),
+        (f"{SQUARE}f 1/1 2/1 3/1\n", "'vt' number 1, expected 1 to 0"),
+        (f"{SQUARE}f 1//9 2//9 3//9\n", "'vn' number 9"),
+        (f"{SQUARE}f a b c\n", "no index"),
+        (f"{SQUARE}f 1 2 99999999999999999999\n", "OBJ"),
+        ("v 0 0\nf 1 1 1\n", "under 3 numbers"),
+        ("v 0 0 zero\nf 1 1 1\n", "no list of numbers"),
+        ("f 1 2 3\n", "'v' number 1, expected 1 to 0"),
+        (f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", "no readable picture"),
+    ],
+)
+def test_damage_is_named_in_one_line(text: str, message: str) -> None:
+    files = {"a.mtl": b"newmtl m\nmap_Kd a.png", "a.png": b"no picture"}
+    with pytest.raises(MeshError, match=message) as caught:
+        read(text, files.get)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("face", ["f 1/ 2/ 3/", "f 1// 2// 3//", "f 1 2/ 3//"])
+def test_empty_places_behind_slashes_mean_absent(face: str) -> None:
+    raw = read(f"{SQUARE}vt 0 0\nvn 0 0 1\n{face}\n")
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
+    assert (raw.uv, raw.normals) == (None, None)
+
+
+def test_mixed_corners_read_like_uniform_ones() -> None:
+    head = f"{SQUARE}vt 0 0\nvt 1 1\nvn 0 0 1\nvn 1 0 0\n"
+    mixed = read(head + "f 1/1/1 2/2/2 3/1/1\nf 1//1 3//2 4//1\n")
+    assert mixed.normals is not None
+    np.testing.assert_array_equal(mixed.normals[mixed.faces][:, :, 0], [[0, 1, 0], [0, 1, 0]])
+    assert mixed.changes == {"faces_without_uv": 1}

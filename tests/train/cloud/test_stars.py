@@ -1,0 +1,77 @@
+"""Delaunay stars: by hand, against Qhull, and on curved surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from flexpara.train.cloud.config import CloudConfig
+from flexpara.train.cloud.normals import local_spacing, nearest_neighbours
+from flexpara.train.cloud.stars import circumradius, rolled_neighbours, star_candidates, star_pairs, tangent_frame
+
+CONFIG = CloudConfig()
+
+
+def test_the_circumradius_of_a_right_triangle_is_half_its_hypotenuse() -> None:
+    triangles = np.array([[[0.0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    np.testing.assert_allclose(circumradius(triangles), [2.5, np.inf])
+
+
+def test_the_tangent_frame_is_orthonormal_and_right_handed_at_the_poles_too() -> None:
+    normals = np.concatenate([np.random.default_rng(0).normal(size=(50, 3)), [[0, 0, 1], [0, 0, -1], [0, 1, 0]]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    first, second = tangent_frame(normals)
+    frames = np.stack([first, second, normals], axis=1)
+    np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.tile(np.eye(3), (53, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(frames), 1.0)
+
+
+def test_the_star_of_four_neighbours_in_a_cross_is_four_triangles() -> None:
+    cross = np.array([[[1.0, 0.1], [0.0, 1.0], [-1.1, 0.0], [0.0, -1.2], [3.0, 3.0], [np.nan, np.nan]]])
+    row, first, second = star_pairs(cross)
+    assert set(zip(first.tolist(), second.tolist(), strict=True)) == {(0, 1), (1, 2), (2, 3), (3, 0)}
+    assert (row == 0).all()
+
+
+def test_a_star_at_a_corner_is_open() -> None:
+    corner = np.array([[[1.0, 0.0], [0.0, 1.2], [0.9, 0.9]]])
+    _, first, second = star_pairs(corner)
+    assert set(zip(first.tolist(), second.tolist(), strict=True)) == {(0, 2), (2, 1)}
+
+
+def test_rows_with_fewer_than_two_neighbours_have_no_star() -> None:
+    flat = np.full((3, 4, 2), np.nan)
+    flat[1, 0] = 1.0
+    assert all(len(column) == 0 for column in star_pairs(flat))
+
+
+def test_stars_in_the_plane_are_those_of_the_delaunay_triangulation() -> None:
+    points = np.random.default_rng(2).random((400, 2))
+    flat = points[None] - points[:, None]
+    flat[np.arange(400), np.arange(400)] = np.nan
+    row, first, second = star_pairs(flat)
+    stars, votes = np.unique(np.sort(np.stack([row, first, second], axis=1), axis=1), axis=0, return_counts=True)
+    expected = np.sort(Delaunay(points).simplices, axis=1)
+    np.testing.assert_array_equal(stars, expected[np.lexsort(expected.T[::-1])])
+    assert (votes == 3).all()
+
+
+def test_rolling_keeps_distance_and_leaves_out_what_is_steep_or_on_the_other_side() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 1], [0, 0.01, 1], [1, 0, 0]])
+    normals = np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, -1]])
+    flat = rolled_neighbours(points, normals, np.array([0]), np.array([[1, 2, 3]]), CONFIG)[0]
+    assert np.linalg.norm(flat[0]) == pytest.approx(np.sqrt(2.0))
+    assert np.isnan(flat[1:]).all()
+
+
+def test_nearly_all_triangles_of_a_sphere_are_seen_by_three_corners_and_face_outwards() -> None:
+    points = np.random.default_rng(3).normal(size=(3000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    index, distance = nearest_neighbours(points, CONFIG.neighbours)
+    found = star_candidates(points, points, index, local_spacing(distance), CONFIG)
+    assert (found.votes == 3).mean() > 0.97
+    corner = points[found.corners]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    assert ((normal * corner.mean(axis=1)).sum(axis=1) > 0.0).all()
+    assert found.radius.max() <= CONFIG.circumradius

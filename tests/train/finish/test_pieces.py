@@ -1,0 +1,217 @@
+"""Pieces: one triangle, rings and tubes in closed form, solids of every topology, half of a real mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs, signed_areas
+from flexpara.runtime.geometry.topology import boundary_loops, components, euler_characteristic, is_manifold
+from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.mesh import Frame, Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.config import FinishConfig
+from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.pieces import Piece, border_length, extract, flattened, make_piece, openings, relieved
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+CONFIG = FinishConfig()
+PRICE = CONFIG.relief.price
+BOWTIE = Surface(
+    np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]]), np.array([[0, 1, 2], [0, 3, 4]])
+)
+
+
+def sample(name: str, resolution: int) -> Surface:
+    return Surface(*make_sample(name, resolution=resolution))
+
+
+def area_of(surface: Surface) -> float:
+    return float(surface.face_areas().sum())
+
+
+def where(chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.flatnonzero(chosen).astype(np.int64)
+
+
+def whole_piece(surface: Surface) -> Piece:
+    piece = make_piece(surface, np.arange(len(surface.faces)), area_of(surface), CONFIG)
+    assert piece is not None
+    return piece
+
+
+def flat_ring() -> tuple[Surface, NDArray[np.int64]]:
+    """A flat sheet, and its faces without a hole in the middle."""
+    cloth = sample("cloth", 16)
+    sheet = Surface(cloth.vertices * [1.0, 1.0, 0.0], cloth.faces)
+    return sheet, where(np.linalg.norm(sheet.triangles.mean(axis=1), axis=1) > 0.4)
+
+
+def assert_valid(piece: Piece, surface: Surface) -> None:
+    flat = piece.flat
+    corners = flat.uv[flat.surface.faces]
+    assert np.array_equal(flat.surface.triangles, surface.triangles[piece.ids])
+    assert not flipped_triangles(corners).any()
+    assert len(overlapping_pairs(corners)) == 0
+    assert components(flat.surface.faces).max() == 0
+    assert is_manifold(flat.surface.faces)
+    assert 2 - euler_characteristic(flat.surface.faces) == len(boundary_loops(flat.surface.faces))  # no handles
+
+
+def test_one_triangle_is_its_own_flattening() -> None:
+    triangle = Surface(np.array([[0.0, 0, 1], [3, 0, 1], [0, 2, 5]]), np.array([[0, 1, 2]]))
+    piece = whole_piece(triangle)
+    assert piece.energy == pytest.approx(0.0, abs=1e-6)
+    assert (piece.slits, piece.method, piece.relief) == (0.0, "slim", ())
+    assert signed_areas(piece.flat.uv[piece.flat.surface.faces]) == pytest.approx(triangle.face_areas(), rel=1e-3)
+
+
+def test_extraction_keeps_the_order_and_cuts_at_a_shared_vertex() -> None:
+    part = extract(BOWTIE, np.array([1, 0]))
+    assert len(part.vertices) == 6
+    assert np.array_equal(part.triangles, BOWTIE.triangles[[1, 0]])
+    assert is_manifold(part.faces)
+
+
+def test_the_border_of_one_side_of_a_cube_is_four_edges_and_of_the_whole_none() -> None:
+    cube = sample("cube", 16)
+    assert border_length(extract(cube, where(cube.face_normals()[:, 2] > 0.5))) == pytest.approx(4.0)
+    assert border_length(cube) == 0.0
+
+
+def test_a_disk_opens_as_it_is() -> None:
+    cone = sample("cone", 16)
+    (only,) = openings(cone, 0.8)
+    assert only is cone
+
+
+def test_a_ring_opens_as_it_is_or_cut_through() -> None:
+    tube = sample("tube", 16)
+    kept, cut = openings(tube, 0.8)
+    assert kept is tube
+    assert euler_characteristic(cut.faces) == 1
+    assert border_length(cut) == pytest.approx(border_length(tube) + 2.0 * 2.0)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "gyroid"])
+def test_a_closed_surface_opens_in_one_way(name: str) -> None:
+    if name == "gyroid":
+        pytest.importorskip("manifold3d")
+    (cut,) = openings(sample(name, 24), 0.8)
+    assert euler_characteristic(cut.faces) == 1
+    assert len(boundary_loops(cut.faces)) == 1
+
+
+def test_a_handle_with_a_hole_is_cut() -> None:
+    torus = sample("torus", 24)
+    pierced = extract(torus, where(np.linalg.norm(torus.triangles.mean(axis=1) - [1.0, 0, 0], axis=1) > 0.2))
+    (cut,) = openings(pierced, 0.8)
+    assert euler_characteristic(cut.faces) == 1
+
+
+def test_a_tube_is_cut_open_and_becomes_flat() -> None:
+    tube = sample("tube", 24)
+    piece = whole_piece(tube)
+    assert_valid(piece, tube)
+    assert piece.method == "slit"
+    assert piece.slits == pytest.approx(2.0 / np.sqrt(area_of(tube)))
+    assert piece.energy < 1e-4
+    assert piece.cost(PRICE) == pytest.approx(piece.energy + PRICE * piece.slits)
+
+
+def test_a_flat_ring_keeps_its_hole() -> None:
+    sheet, ids = flat_ring()
+    piece = make_piece(sheet, ids, area_of(sheet), CONFIG)
+    assert piece is not None
+    assert_valid(piece, sheet)
+    assert (piece.slits, piece.method) == (0.0, "slim")
+    assert piece.energy < 1e-3
+    assert len(boundary_loops(piece.flat.surface.faces)) == 2
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "trefoil", "tube", "cone", "cube", "cloth", "gyroid", "bracket"])
+def test_any_solid_is_one_valid_piece(name: str) -> None:
+    if name in ("gyroid", "bracket"):
+        pytest.importorskip("manifold3d")
+    surface = sample(name, 20)
+    assert_valid(whole_piece(surface), surface)
+
+
+def test_energy_and_slits_are_shares_of_the_whole_surface() -> None:
+    sphere = sample("sphere", 24)
+    ids = where(sphere.triangles.mean(axis=1)[:, 2] > 0.0)
+    piece = make_piece(sphere, ids, area_of(sphere), CONFIG)
+    larger = make_piece(sphere, ids, 4.0 * area_of(sphere), CONFIG)
+    assert piece is not None
+    assert larger is not None
+    assert piece.energy == pytest.approx(excess_energy(piece.flat.surface, piece.flat.uv) / area_of(sphere))
+    assert larger.energy == pytest.approx(piece.energy / 4.0)
+
+
+def test_a_goal_out_of_sight_gives_no_piece() -> None:
+    sphere = sample("sphere", 24)
+    ids = where(sphere.triangles.mean(axis=1)[:, 2] > -0.5)
+    piece = make_piece(sphere, ids, area_of(sphere), CONFIG)
+    assert piece is not None
+    assert make_piece(sphere, ids, area_of(sphere), CONFIG, goal=0.1 * piece.energy) is None
+    assert make_piece(sphere, ids, area_of(sphere), CONFIG, goal=2.0 * piece.energy) is not None
+
+
+def test_holes_are_not_grown_shut_while_flattening() -> None:
+    sheet, ids = flat_ring()
+    ring = extract(sheet, ids)
+    uv = flattened(ring, CONFIG.relief.contact, np.inf)
+    assert uv is not None
+    assert uv.shape == (len(ring.vertices), 2)
+    assert signed_areas(uv[ring.faces]).sum() == pytest.approx(area_of(ring), rel=0.01)
+
+
+def test_relief_adds_its_slit_to_the_piece() -> None:
+    cone = sample("cone", 32)
+    plain = whole_piece(cone)
+    assert plain.slits == 0.0
+    open_ = relieved(plain, area_of(cone), CONFIG.relief)
+    assert_valid(open_, cone)
+    assert open_.method == "slit"
+    assert open_.slits == pytest.approx(np.hypot(0.5, 1.0) / np.sqrt(area_of(cone)), rel=0.02)
+    assert len(open_.relief) == 1
+    assert open_.cost(PRICE) < plain.cost(PRICE) - 0.1
+    assert np.array_equal(open_.ids, plain.ids)
+
+
+def test_a_piece_without_relief_stays_what_it_is() -> None:
+    sheet, ids = flat_ring()
+    piece = make_piece(sheet, ids, area_of(sheet), CONFIG)
+    assert piece is not None
+    assert np.array_equal(relieved(piece, area_of(sheet), CONFIG.relief).flat.uv, piece.flat.uv)
+
+
+def test_relief_slits_can_be_given_to_the_piece_again() -> None:
+    cone = sample("cone", 32)
+    open_ = relieved(whole_piece(cone), area_of(cone), CONFIG.relief)
+    again = make_piece(cone, open_.ids, area_of(cone), CONFIG, open_.relief)
+    assert again is not None
+    assert_valid(again, cone)
+    assert again.slits == pytest.approx(open_.slits)
+    assert again.energy == pytest.approx(open_.energy, abs=1e-4)
+    assert len(again.relief) == 1
+
+
+def test_half_of_a_real_mesh_is_a_valid_piece(models: Path) -> None:
+    surface = load_asset(models / "suzanne.obj").surface
+    surface = Surface(Frame.of(surface.vertices).apply(surface.vertices), surface.faces)
+    side = surface.triangles.mean(axis=1)[:, 0] > 0.0
+    part = components(surface.faces[side])
+    ids = where(side)[part == np.bincount(part).argmax()]
+    piece = make_piece(surface, ids, area_of(surface), CONFIG)
+    assert piece is not None
+    assert_valid(piece, surface)
+    assert_valid(relieved(piece, area_of(surface), CONFIG.relief), surface)

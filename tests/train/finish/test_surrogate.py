@@ -1,0 +1,187 @@
+"""The simplified twin: small meshes stay, large ones keep their shape, and labels find their way back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.topology import components, edge_table, euler_characteristic, is_manifold
+from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.mesh import Frame, Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.finish.surrogate import carry_labels, simplified
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+FACES = 1000
+
+
+def sample(name: str, resolution: int) -> Surface:
+    return Surface(*make_sample(name, resolution=resolution))
+
+
+def spread(surface: Surface, count: int) -> NDArray[np.float64]:
+    """Points all over a surface, (count, 3)."""
+    rng = np.random.default_rng(0)
+    area = surface.face_areas()
+    face = rng.choice(len(area), count, p=area / area.sum())
+    share = rng.dirichlet(np.ones(3), count)
+    return np.einsum("nc,ncd->nd", share, surface.triangles[face])
+
+
+def distance(first: Surface, second: Surface) -> float:
+    """About the Hausdorff distance of two surfaces, from dense samples (a few hundredths too large at most)."""
+    a, b = spread(first, 20000), spread(second, 20000)
+    return float(max(KDTree(a).query(b)[0].max(), KDTree(b).query(a)[0].max()))
+
+
+def assert_sound(surface: Surface) -> None:
+    assert surface.faces.dtype == np.int64
+    assert surface.vertices.dtype == np.float64
+    assert np.array_equal(np.unique(surface.faces), np.arange(len(surface.vertices)))  # no vertex unused
+    assert (surface.face_areas() > 0.0).all()
+    assert np.isfinite(surface.vertices).all()
+
+
+def test_a_small_surface_is_its_own_twin() -> None:
+    sphere = sample("sphere", 12)
+    assert simplified(sphere, FACES) is sphere
+
+
+def test_a_little_too_large_is_left_alone() -> None:
+    sphere = sample("sphere", 48)
+    assert simplified(sphere, 900) is sphere
+    assert simplified(sphere, 800) is not sphere
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "tube", "cloth", "bracket"])
+def test_the_twin_has_about_the_faces_asked_for_and_the_same_shape(name: str) -> None:
+    if name == "bracket":
+        pytest.importorskip("manifold3d")
+    surface = sample(name, 72)
+    twin = simplified(surface, FACES)
+    assert_sound(twin)
+    assert 0.9 * FACES <= len(twin.faces) <= FACES
+    assert euler_characteristic(twin.faces) == euler_characteristic(surface.faces)
+    assert is_manifold(twin.faces)
+    assert distance(surface, twin) < 0.1
+    assert twin.face_areas().sum() == pytest.approx(surface.face_areas().sum(), rel=0.03)
+
+
+def test_normals_stay_outwards() -> None:
+    twin = simplified(sample("sphere", 72), FACES)
+    outwards = twin.triangles.mean(axis=1)
+    assert (np.einsum("fc,fc->f", twin.face_normals(), outwards) > 0.9).all()
+
+
+def test_the_border_stays_where_it_is() -> None:
+    twin = simplified(sample("tube", 72), FACES)
+    table = edge_table(twin.faces)
+    assert np.abs(twin.vertices[np.unique(table.edges[table.boundary])][:, 2]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_two_solids_that_share_a_vertex_are_simplified_apart() -> None:
+    sphere = sample("sphere", 72)
+    lowest = int(sphere.vertices[:, 2].argmin())
+    above = sphere.vertices - sphere.vertices[lowest]
+    index = np.arange(len(above)) + len(above) - (np.arange(len(above)) > lowest)
+    index[lowest] = lowest
+    below = -np.delete(above, lowest, axis=0)  # mirrored through the shared vertex, so it turns inside out
+    kiss = Surface(np.concatenate([above, below]), np.concatenate([sphere.faces, index[sphere.faces][:, ::-1]]))
+    assert not is_manifold(kiss.faces)
+    twin = simplified(kiss, FACES)
+    assert_sound(twin)
+    assert len(twin.faces) <= FACES
+    assert components(twin.faces).max() == 1
+    assert is_manifold(twin.faces)
+    assert distance(kiss, twin) < 0.15
+
+
+def test_sheets_on_one_edge_are_simplified_apart() -> None:
+    cloth = sample("cloth", 36)
+    flat = cloth.vertices * [0.5, 0.5, 0.0] + [0.0, 0.5, 0.0]
+    upright = flat[:, [0, 2, 1]]
+    edge = flat[:, 1] == 0.0
+    index = np.arange(len(flat)) + len(flat) - np.cumsum(edge)
+    index[edge] = np.flatnonzero(edge)
+    slanted = flat * [1.0, -1.0, 1.0]
+    index2 = np.arange(len(flat)) + 2 * len(flat) - edge.sum() - np.cumsum(edge)
+    index2[edge] = np.flatnonzero(edge)
+    vertices = np.concatenate([flat, upright[~edge], slanted[~edge]])
+    book = Surface(vertices, np.concatenate([cloth.faces, index[cloth.faces], index2[cloth.faces]]))
+    assert (edge_table(book.faces).edge_count == 3).sum() == 36
+    twin = simplified(book, 600)
+    assert_sound(twin)
+    assert components(twin.faces).max() == 2
+    assert distance(book, twin) < 0.1
+
+
+def test_the_source_is_not_written_to() -> None:
+    sphere = sample("sphere", 72)
+    vertices, faces = sphere.vertices.copy(), sphere.faces.copy()
+    simplified(sphere, FACES)
+    assert np.array_equal(sphere.vertices, vertices)
+    assert np.array_equal(sphere.faces, faces)
+
+
+def test_the_same_surface_gives_the_same_twin() -> None:
+    first, second = (simplified(sample("torus", 72), FACES) for _ in range(2))
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+    assert first.faces.tobytes() == second.faces.tobytes()
+
+
+def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:
+    sphere = sample("sphere", 24)
+    label = np.random.default_rng(0).integers(0, 4, len(sphere.faces))
+    label[:4] = np.arange(4)
+    share = carry_labels(sphere, label, sphere, neighbours=1)
+    assert np.array_equal(share, np.eye(4)[label])
+
+
+def test_shares_are_a_partition() -> None:
+    sphere, twin = sample("sphere", 24), sample("sphere", 12)
+    label = np.arange(len(twin.faces)) % 5
+    share = carry_labels(twin, label, sphere)
+    assert share.shape == (len(sphere.faces), 5)
+    assert share.sum(axis=1) == pytest.approx(1.0)
+    assert (share >= 0.0).all()
+
+
+def test_two_colours_of_a_sphere_come_back_right() -> None:
+    sphere = sample("sphere", 96)
+    twin = simplified(sphere, FACES)
+    share = carry_labels(twin, (twin.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere)
+    height = sphere.triangles.mean(axis=1)[:, 2]
+    clear = np.abs(height) > 0.1
+    assert np.array_equal(share.argmax(axis=1)[clear], (height[clear] > 0.0).astype(np.int64))
+    assert (share.argmax(axis=1) == (height > 0.0)).mean() > 0.97
+
+
+def test_the_normal_tells_the_two_sides_of_a_thin_plate_apart() -> None:
+    cube = sample("cube", 48)
+    plate = Surface(cube.vertices * [1.0, 1.0, 0.004], cube.faces)
+    label = (plate.face_normals()[:, 2] > 0.5).astype(np.int64)
+    shifted = Surface(plate.vertices - [0.0, 0.0, 0.004], plate.faces)  # as simplification may move a sheet
+    faces = np.abs(plate.face_normals()[:, 2]) > 0.5
+    assert np.array_equal(carry_labels(plate, label, shifted).argmax(axis=1)[faces], label[faces])
+    blind = carry_labels(plate, label, shifted, normal_weight=0.0).argmax(axis=1)[faces]
+    assert (blind != label[faces]).mean() > 0.3  # without normals it can't
+
+
+@pytest.mark.parametrize("name", ["bunny", "homer"])
+def test_the_twin_of_a_real_mesh_keeps_its_shape(name: str, models: Path) -> None:
+    surface = load_asset(models / f"{name}.obj").surface
+    surface = Surface(Frame.of(surface.vertices).apply(surface.vertices), surface.faces)
+    twin = simplified(surface, 3000)
+    assert_sound(twin)
+    assert 2700 <= len(twin.faces) <= 3000
+    assert euler_characteristic(twin.faces) == euler_characteristic(surface.faces)
+    assert distance(surface, twin) < 0.06

@@ -1,0 +1,1 @@
+"""Triangles laid over a point cloud."""

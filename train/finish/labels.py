@@ -1,0 +1,169 @@
+"""Face labels: from chart probabilities to at most K connected pieces with short seams along creases.
+
+f faces · k labels · a *dual graph* joins faces across interior edges: pairs (m, 2), seam cost (m,) in lengths.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, maximum_flow
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.geometry.topology import EdgeTable
+    from ...runtime.mesh import Surface
+    from ..config import LabelConfig
+
+
+class DualGraph(NamedTuple):
+    """Faces joined across manifold edges.  pairs (m, 2) int64; length (m,) of the edges; cost (m,) of a seam there."""
+
+    pairs: NDArray[np.int64]
+    length: NDArray[np.float64]
+    cost: NDArray[np.float64]
+
+
+def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> DualGraph:
+    """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
+
+    The discount follows 1 − |cos(half the dihedral deviation)|-like growth: none on flat ground, full from 60° on.
+    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join nothing: the
+    surface is cut there anyway.
+    """
+    inside = np.flatnonzero(table.manifold)
+    pairs = table.edge_faces[inside]
+    ends = surface.vertices[table.edges[inside]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    normals = surface.face_normals()
+    cosine = np.einsum("ec,ec->e", normals[pairs[:, 0]], normals[pairs[:, 1]])
+    sharpness = np.clip((1.0 - cosine) / 0.5, 0.0, 1.0)
+    return DualGraph(pairs, length, length * (1.0 - crease_discount * sharpness))
+
+
+def label_energy(label: NDArray[np.int64], unary: NDArray[np.float64], graph: DualGraph) -> float:
+    """Σ unary of the labels + Σ cost of the seams: what ``smooth_labels`` lowers."""
+    seam = label[graph.pairs[:, 0]] != label[graph.pairs[:, 1]]
+    return float(unary[np.arange(len(label)), label].sum() + graph.cost[seam].sum())
+
+
+def smooth_labels(unary: NDArray[np.float64], graph: DualGraph, *, sweeps: int = 2) -> NDArray[np.int64]:
+    """Labels (f,) of low energy by α-expansion (Boykov, Veksler & Zabih 2001); unary (f, k) costs in lengths."""
+    label = unary.argmin(axis=1)
+    energy = label_energy(label, unary, graph)
+    for _ in range(sweeps):
+        for alpha in range(unary.shape[1]):
+            moved = expand_label(label, alpha, unary, graph)
+            moved_energy = label_energy(moved, unary, graph)
+            if moved_energy < energy:
+                label, energy = moved, moved_energy
+    return label
+
+
+def expand_label(
+    label: NDArray[np.int64], alpha: int, unary: NDArray[np.float64], graph: DualGraph
+) -> NDArray[np.int64]:
+    """The best labelling in which each face keeps its label or takes ``alpha``: one minimum cut.
+
+    Only faces that could gain take part; the others are walls that keep their label.
+    """
+    faces = np.arange(len(label))
+    gain = unary[faces, label] - unary[:, alpha]
+    i, j = graph.pairs.T
+    reach = np.zeros(len(label))
+    np.add.at(reach, i, graph.cost)
+    np.add.at(reach, j, graph.cost)
+    free = (label != alpha) & (gain + reach > 0.0)
+    if not free.any():
+        return label
+    keep, take = unary[faces, label].copy(), unary[:, alpha].copy()
+    both = free[i] & free[j]
+    for a, b in ((i, j), (j, i)):
+        one = free[a] & ~free[b]
+        np.add.at(keep, a[one], graph.cost[one] * (label[a[one]] != label[b[one]]))
+        np.add.at(take, a[one], graph.cost[one] * (label[b[one]] != alpha))
+    cut = i[both], j[both], graph.cost[both]
+    apart = cut[2] * (label[cut[0]] != label[cut[1]])
+    # E(0,0) = apart, E(0,1) = E(1,0) = cost, E(1,1) = 0, as unary terms plus one directed edge
+    np.add.at(take, cut[0], cut[2] - apart)
+    np.add.at(take, cut[1], -cut[2])
+    take_side = minimum_cut(keep[free], take[free], cut, free, 2.0 * cut[2] - apart)
+    moved = label.copy()
+    moved[np.flatnonzero(free)[take_side]] = alpha
+    return moved
+
+
+def minimum_cut(
+    keep: NDArray[np.float64],
+    take: NDArray[np.float64],
+    edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
+    free: NDArray[np.bool_],
+    capacity: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Which free faces switch (m,): least Σ keep/take costs + Σ capacity where only the second switches."""
+    number = np.cumsum(free) - 1
+    size = len(keep)
+    source, sink = size, size + 1
+    base = np.minimum(keep, take)
+    node = np.arange(size)
+    rows = np.concatenate([np.full(size, source), node, number[edges[0]]])
+    cols = np.concatenate([node, np.full(size, sink), number[edges[1]]])
+    # cut source→node when the node switches (pays take), node→sink when it keeps (pays keep)
+    costs = np.concatenate([take - base, keep - base, capacity])
+    scale = 1e5 / max(costs.max(), 1e-30)
+    matrix = sparse.csr_array((np.round(costs * scale).astype(np.int32), (rows, cols)), shape=(size + 2, size + 2))
+    matrix.sum_duplicates()
+    flow = maximum_flow(matrix, source, sink)
+    residual = matrix - flow.flow
+    residual.data[residual.data < 0] = 0
+    residual.eliminate_zeros()
+    reached = sparse.csgraph.breadth_first_order(residual, source, return_predecessors=False)
+    switch = np.ones(size + 2, dtype=bool)
+    switch[reached] = False
+    return switch[:size]
+
+
+def connected_pieces(label: NDArray[np.int64], graph: DualGraph) -> NDArray[np.int64]:
+    """Number (f,) of the connected piece of equal label that each face lies in."""
+    same = label[graph.pairs[:, 0]] == label[graph.pairs[:, 1]]
+    i, j = graph.pairs[same].T
+    links = sparse.coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(len(label), len(label)))
+    return connected_components(links, directed=False)[1].astype(np.int64)
+
+
+def merge_pieces(
+    label: NDArray[np.int64], areas: NDArray[np.float64], graph: DualGraph, most: int, config: LabelConfig
+) -> NDArray[np.int64]:
+    """Pieces (f,), numbered 0…: islets and whatever exceeds ``most`` pieces a component joins its longest neighbour.
+
+    A piece that is a whole connected component has no neighbour and stays; each component beyond the first raises the
+    limit by one.
+    """
+    piece = connected_pieces(label, graph)
+    component = connected_pieces(np.zeros_like(label), graph)
+    most += int(component.max())
+    smallest = config.islet_area * areas.sum()
+    while True:
+        count = int(piece.max()) + 1
+        size = np.bincount(piece, areas, minlength=count)
+        border = border_lengths(piece, count, graph)
+        mergeable = np.flatnonzero(border.sum(axis=1) > 0)
+        if len(mergeable) == 0:
+            return piece
+        least = int(mergeable[size[mergeable].argmin()])
+        if size[least] >= smallest and count <= most:
+            return piece
+        piece = np.where(piece == least, border[least].argmax(), piece)
+        piece = np.unique(piece, return_inverse=True)[1].astype(np.int64)
+
+
+def border_lengths(piece: NDArray[np.int64], count: int, graph: DualGraph) -> NDArray[np.float64]:
+    """(count, count) length of the border between each two pieces; zero diagonal."""
+    i, j = piece[graph.pairs[:, 0]], piece[graph.pairs[:, 1]]
+    apart = i != j
+    i, j, length = i[apart], j[apart], graph.length[apart]
+    matrix = np.bincount(i * count + j, length, minlength=count * count).reshape(count, count)
+    return (matrix + matrix.T).astype(np.float64)

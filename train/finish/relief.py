@@ -1,0 +1,183 @@
+"""Relief cuts: a chart that no disk can carry without stretch is slit from its border to where it hurts.
+
+A cut leaves the flattening as it is (both sides keep their uv), so SLIM goes on from there and opens the slit.
+Lengths and areas are shares: length / √(area of the whole surface), area / (area of the whole surface).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from ...runtime.geometry.topology import EdgeTable, edge_table
+from ...runtime.mesh import Surface
+from .contact import Relaxed, excess_energy, relax
+from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
+from .flatten import jacobians, symmetric_dirichlet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ..config import ContactConfig, ReliefConfig
+
+
+class Flat(NamedTuple):
+    """A flattened piece, without flips and overlap.  pins: contacts that hold it apart, by vertex."""
+
+    surface: Surface
+    uv: NDArray[np.float64]
+    pins: dict[int, NDArray[np.float64]]
+
+    def relaxed(self, config: ContactConfig, *, goal: float = np.inf) -> Flat:
+        """The piece after SLIM, still valid; unchanged where the goal (excess energy) is out of sight."""
+        state = relax(self.surface, Relaxed(self.uv, self.pins), config, goal=goal)
+        return self._replace(uv=state.uv, pins=state.pins)
+
+
+def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
+    """(v,) excess energy density around each vertex, smoothed over about ``radius`` (source units).
+
+    Only squeezed faces count: a slit lets a cone open; at a saddle, which is stretched, its two sides would overlap.
+    """
+    faces, count = flat.surface.faces, len(flat.surface.vertices)
+    areas = flat.surface.face_areas()
+    mass = np.bincount(faces.reshape(-1), np.repeat(areas, 3), minlength=count)
+    energy = np.minimum(symmetric_dirichlet(jacobians(flat.surface, flat.uv)) - 1.0, 10.0)
+    squeezed = np.linalg.det(jacobians(flat.surface, flat.uv)) < 1.0
+    load = np.bincount(faces.reshape(-1), np.repeat(areas * energy * squeezed, 3), minlength=count)
+    ends = flat.surface.vertices[table.edges]
+    spacing = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+    i, j = table.edges.T
+    links = sparse.coo_array(
+        (np.ones(2 * len(i)), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(count, count)
+    )
+    links = (links + sparse.eye_array(count)).tocsr()
+    links = sparse.diags_array(1.0 / links.sum(axis=0)) @ links  # columns pass on all they have
+    for _ in range(int(np.clip((radius / spacing) ** 2, 1, 60))):
+        mass, load = links.T @ mass, links.T @ load
+    return load / np.maximum(mass, 1e-300)
+
+
+class Slit(NamedTuple):
+    """A cut inside a piece, by its ends in space: from a border vertex to an inner one."""
+
+    start: NDArray[np.float64]
+    target: NDArray[np.float64]
+
+
+def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
+    """The piece slit along a vertex path that begins or ends on its border; both sides keep their uv."""
+    faces, old = cut_open(flat.surface.faces, path_mask(table, [path]), table)
+    pins = {new: flat.pins[vertex] for new, vertex in enumerate(old.tolist()) if vertex in flat.pins}
+    return Flat(Surface(flat.surface.vertices[old], faces), flat.uv[old], pins)
+
+
+def border_paths(surface: Surface, table: EdgeTable, sources: NDArray[np.int64], config: ReliefConfig) -> ShortestPaths:
+    """Cheapest ways from the source vertices (b,) to each vertex."""
+    cost = edge_costs(surface, table, config.crease_discount)
+    return shortest_paths(len(surface.vertices), table.edges, cost, sources)
+
+
+def most_stressed(
+    flat: Flat,
+    table: EdgeTable,
+    distance: NDArray[np.float64],
+    spared: list[NDArray[np.float64]],
+    reach: float,
+    near: float,
+) -> int | None:
+    """The vertex a slit should lead to: no closer to the border than ``near``, and 2 · reach from spared points."""
+    pressure = stress(flat, table, reach)
+    pressure[~(distance >= near)] = 0.0
+    for point in spared:
+        pressure[np.linalg.norm(flat.surface.vertices - point, axis=1) < 2.0 * reach] = 0.0
+    target = int(pressure.argmax())
+    return target if pressure[target] > 0.0 else None
+
+
+def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: ReliefConfig) -> Iterator[list[int]]:
+    """Ways from the border to a vertex: the cheapest, then one from elsewhere, which unrolls to the other side."""
+    border = np.unique(table.edges[table.edge_count == 1])
+    sources = border
+    for _ in range(config.ways):
+        if len(sources) == 0:
+            return
+        paths = border_paths(surface, table, sources, config)
+        if not np.isfinite(paths.distance[target]):
+            return
+        path = trace_back(paths.parent, target)
+        # a way that touches the border before its source would cut the piece in two: it starts where it last does
+        path = path[: int(np.isin(path, border).argmax()) + 1]
+        yield path
+        start = surface.vertices[path[-1]]
+        apart = config.apart * path_length(surface, path)
+        sources = sources[np.linalg.norm(surface.vertices[sources] - start, axis=1) > apart]
+
+
+def path_length(surface: Surface, path: list[int]) -> float:
+    """Length of a vertex path, in source units."""
+    points = surface.vertices[path]
+    return float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum())
+
+
+def slit_along(surface: Surface, slits: tuple[Slit, ...], config: ReliefConfig) -> Surface:
+    """The piece with slits made elsewhere: between the vertices nearest to their ends, in their order."""
+    flat = Flat(surface, np.zeros((len(surface.vertices), 2)), {})
+    for start, target in slits:
+        table = edge_table(flat.surface.faces)
+        border = np.unique(table.edges[table.edge_count == 1])
+        points = flat.surface.vertices
+        gap = np.linalg.norm(points[border] - start, axis=1)
+        # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
+        paths = border_paths(flat.surface, table, border[gap <= gap.min()], config)
+        # the border itself is no way to cut along: the path leaves it where it last touches it
+        path = trace_back(paths.parent, int(np.linalg.norm(points - target, axis=1).argmin()))
+        on_border = np.flatnonzero(np.isin(path, border))
+        flat = slit_to(flat, path[: int(on_border[0]) + 1] if len(on_border) else path, table)
+    return flat.surface
+
+
+def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, tuple[Slit, ...]]:
+    """The piece with every slit that pays, and those slits.
+
+    A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most
+    stressed vertex, run SLIM, keep the slit if it paid, else leave that neighbourhood alone.
+    """
+    unit = float(np.sqrt(total_area))
+    spared: list[NDArray[np.float64]] = []
+    slits: list[Slit] = []
+    energy = excess_energy(flat.surface, flat.uv) / total_area
+    while len(spared) < config.failures and len(slits) < config.most and energy > config.price * config.shortest:
+        table = edge_table(flat.surface.faces)
+        border = np.unique(table.edges[table.edge_count == 1])
+        distance = border_paths(flat.surface, table, border, config).distance
+        target = most_stressed(flat, table, distance, spared, config.radius * unit, config.near * unit)
+        if target is None:
+            break
+        point = flat.surface.vertices[target]
+        found = best_slit(flat, table, target, energy, total_area, config)
+        if found is None:
+            spared.append(point)
+            continue
+        flat, slit = found
+        energy = excess_energy(flat.surface, flat.uv) / total_area
+        slits.append(slit)
+    return flat, tuple(slits)
+
+
+def best_slit(
+    flat: Flat, table: EdgeTable, target: int, energy: float, total_area: float, config: ReliefConfig
+) -> tuple[Flat, Slit] | None:
+    """The first way to slit to a vertex that pays; ``energy`` is the piece's share of excess before."""
+    for path in candidate_paths(flat.surface, table, target, config):
+        length = path_length(flat.surface, path) / float(np.sqrt(total_area))
+        needed = energy - config.price * max(length, config.shortest)
+        trial = slit_to(flat, path, table).relaxed(config.contact, goal=needed * total_area)
+        if excess_energy(trial.surface, trial.uv) < needed * total_area:
+            points = flat.surface.vertices
+            return trial, Slit(points[path[-1]], points[target])
+    return None
