@@ -3,7 +3,8 @@
 Every tool unwraps the same cleaned surface and is measured by the same function in the same run.  xatlas and uvunwrap
 are timed by their call, flexpara as a whole process (`flexpara unwrap MESH --maps none`), start-up and all files
 included.  Peak memory is that of the whole process.  Lengths are relative (see `flexpara.runtime.geometry.metrics`);
-seconds are the median of --repeat runs.  The bars are those the project has set itself; a row of flexpara names those it misses.
+seconds are the median of --repeat runs.  The bars are those the project has set itself; a row of flexpara names those
+it misses.
 """
 
 from __future__ import annotations

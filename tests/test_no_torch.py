@@ -25,7 +25,9 @@ NOT_FOR_RUNTIME = (
 )
 HEAVY = (*NOT_FOR_RUNTIME, "onnxruntime", "scipy", "trimesh", "xatlas", "PIL", "rich", "cyclopts", "numpy")
 RUNTIME = ["flexpara.runtime"] + [
-    f"flexpara.runtime.{path.stem}" for path in sorted((ROOT / "runtime").glob("*.py")) if path.stem != "__init__"
+    "flexpara." + ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in sorted((ROOT / "runtime").rglob("*.py"))
+    if path.stem != "__init__"
 ]
 BLOCK = """
 import importlib.abc, sys
