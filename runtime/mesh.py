@@ -15,6 +15,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .material import Material
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -65,19 +67,6 @@ class Frame:
     def apply(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
         """(…, 3) source units → (…, 3) unit ball."""
         return (xyz - np.asarray(self.centre)) / self.scale
-
-
-@dataclass(frozen=True, eq=False)
-class Material:
-    """One material of the source file, as far as baking needs it.
-
-    name: as in the file.  base_color_factor: linear RGBA in [0, 1].
-    base_color: (h, w, 4) uint8 sRGB, row 0 = top, or None.
-    """
-
-    name: str = "material"
-    base_color_factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    base_color: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,7 +122,7 @@ class Outputs:
 
     def for_asset(self, asset: Asset) -> Outputs:
         """The same with "auto" replaced by the maps it stands for, each map once."""
-        from .io.materials import source_maps
+        from .material import source_maps
 
         auto = ("normal", "position", *(source_maps(asset) or ("uv-checker",)))
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.geometry.topology import edge_table
-from ...runtime.io.materials import PbrMaterial, picture_of, used_materials
-from ..maps.material import DEFAULT_FINISH, emissive_strength, finish_of
+from ...runtime.material import Material, used_materials
+from ..maps.material import emissive_strength
 from .glbbuffer import Buffer, gl
 from .images import encode_png
 from .targets import with_green
@@ -25,8 +25,8 @@ from .targets import with_green
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ...runtime.io.materials import AlphaMode
-    from ...runtime.mesh import Asset, Material
+    from ...runtime.material import AlphaMode
+    from ...runtime.mesh import Asset
     from .images import Texture
 
 BASE_COLOR_MAPS = ("base-color", "vertex-color", "uv-checker", "chart")
@@ -71,7 +71,7 @@ def add_material(document: gl.GLTF2, buffer: Buffer, asset: Asset, textures: Map
     images, used = Images(document, buffer, textures), used_materials(asset)
     single = used[0] if len(used) == 1 else None
     opened = bool((edge_table(asset.surface.faces).edge_count == 1).any())
-    seen_behind = any(isinstance(entry, PbrMaterial) and entry.double_sided for entry in used)
+    seen_behind = any(entry.double_sided for entry in used)
     material = gl.Material(
         name=single.name if single is not None else asset.stem,
         pbrMetallicRoughness=_surface(images, used, single),
@@ -92,8 +92,8 @@ def add_material(document: gl.GLTF2, buffer: Buffer, asset: Asset, textures: Map
 def _surface(images: Images, used: list[Material], single: Material | None) -> gl.PbrMetallicRoughness:
     """Base colour and finish."""
     color, finish = images.first(*BASE_COLOR_MAPS), images.first("orm", "metallic-roughness")
-    kept = {finish_of(entry) for entry in used}
-    metallic, roughness = kept.pop() if len(kept) == 1 else DEFAULT_FINISH
+    kept = {entry.finish for entry in used}
+    metallic, roughness = kept.pop() if len(kept) == 1 else Material().finish
     surface = gl.PbrMetallicRoughness(
         baseColorFactor=list(single.base_color_factor) if single is not None and color is None else [1.0] * 4,
         metallicFactor=metallic if finish is None else 1.0,
@@ -111,8 +111,8 @@ def _add_alpha(material: gl.Material, images: Images, used: list[Material]) -> N
     name = images.first(*BASE_COLOR_MAPS)
     if name is not None and images.textures[name].pixels.shape[2] != 4:
         return
-    modes: set[AlphaMode] = {entry.alpha_mode for entry in used if isinstance(entry, PbrMaterial)}
-    cutoffs = [entry.alpha_cutoff for entry in used if isinstance(entry, PbrMaterial) and entry.alpha_mode == "MASK"]
+    modes: set[AlphaMode] = {entry.alpha_mode for entry in used}
+    cutoffs = [entry.alpha_cutoff for entry in used if entry.alpha_mode == "MASK"]
     through = name is not None or any(entry.base_color_factor[3] < 1.0 for entry in used)
     if "BLEND" in modes or (not modes and through):
         material.alphaMode = gl.BLEND
@@ -125,12 +125,12 @@ def _add_emission(
     document: gl.GLTF2, material: gl.Material, images: Images, asset: Asset, used: list[Material]
 ) -> None:
     """Emissive texture or factor; what is above 1 goes into the extension."""
-    glows = {entry.emissive for entry in used if isinstance(entry, PbrMaterial)}
+    glows = {entry.emissive for entry in used}
     strength, factor = emissive_strength(asset), np.zeros(3)
     if "emissive" in images.textures:
         material.emissiveTexture = gl.TextureInfo(index=images.embed("emissive"))
         factor = np.ones(3)
-    elif len(glows) == 1 and not any(picture_of(entry, "emissive") for entry in used):
+    elif len(glows) == 1 and not any("emissive" in entry.pictures for entry in used):
         factor = np.asarray(glows.pop()) / strength
     if not factor.any():
         return

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.io.materials import PbrMaterial, used_materials
-from ..maps.material import emissive_strength, finish_of
+from ...runtime.material import Material, used_materials
+from ..maps.material import emissive_strength
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -146,13 +146,13 @@ def _material_text(root: str, asset: Asset, textures: Mapping[str, str], *, alph
 def _factors(asset: Asset, products: set[str]) -> dict[str, str]:
     """Input → line, for what no texture holds."""
     used = used_materials(asset)
-    finishes = {finish_of(entry) for entry in used}
-    metallic, roughness = finishes.pop() if len(finishes) == 1 else (0.0, 0.8)
+    finishes = {entry.finish for entry in used}
+    metallic, roughness = finishes.pop() if len(finishes) == 1 else Material().finish
     lines: dict[str, str] = {}
     if "occlusionRoughnessMetallic" not in products:
         lines["metallic"] = f"float inputs:metallic = {metallic:.9g}"
         lines["roughness"] = f"float inputs:roughness = {roughness:.9g}"
-    glows = {entry.emissive for entry in used if isinstance(entry, PbrMaterial)}
+    glows = {entry.emissive for entry in used}
     if len(glows) == 1 and "emissive" not in products:
         lines["emissiveColor"] = "color3f inputs:emissiveColor = ({:.9g}, {:.9g}, {:.9g})".format(*glows.pop())
     if len(used) == 1 and "base-color" not in products:
@@ -165,7 +165,7 @@ def _factors(asset: Asset, products: set[str]) -> dict[str, str]:
 
 def _cutoff(asset: Asset) -> dict[str, str]:
     """The threshold of opacity where every material is cut: the map is scaled so that it lies at ½."""
-    modes = {entry.alpha_mode for entry in used_materials(asset) if isinstance(entry, PbrMaterial)}
+    modes = {entry.alpha_mode for entry in used_materials(asset)}
     masked = "MASK" in modes and "BLEND" not in modes
     return {"opacityThreshold": "float inputs:opacityThreshold = 0.5"} if masked else {}
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...runtime.mesh import Asset, Atlas, Material, Surface
+from ...runtime.material import Material
+from ...runtime.mesh import Asset, Atlas, Surface
 from ...runtime.pack.seams import smooth_normals
 
 if TYPE_CHECKING:

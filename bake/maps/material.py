@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.io.materials import PbrMaterial, picture_of, used_materials
-from ...runtime.mesh import Material
+from ...runtime.material import Material, used_materials
 from .resample import FootprintSampler, SourceTexture, linear_colors, texel_axes
 from .tangents import mikk_tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.io.materials import Slot
+    from ...runtime.material import Slot
     from ...runtime.mesh import Asset, Atlas
     from ..raster.gbuffer import GBuffer
     from .resample import Decoding
@@ -41,8 +40,8 @@ CHANNELS: dict[Slot, tuple[int, ...]] = {
     "metallic-roughness": (1, 2),
     "occlusion": (0,),
 }
-DEFAULT_FINISH = (0.0, 0.8)
-"""Metallic and roughness of a material that says nothing about them: a matt surface that is no metal."""
+BARE = Material(alpha_mode="BLEND")
+"""Of a surface without materials: the alpha of its vertex colours counts."""
 
 Shade = Callable[[Material, "NDArray[np.float32] | None", "NDArray[np.int64]"], "NDArray[np.float32]"]
 Compute = Callable[["GBuffer", "Atlas", "Asset"], "NDArray[np.float32]"]
@@ -53,10 +52,10 @@ class SourceSlot:
 
     def __init__(self, atlas: Atlas, asset: Asset, slot: Slot, size: int) -> None:
         """Prepare.  size: texels per side of the image that is baked."""
-        self.materials = asset.materials or (Material(),)
+        self.materials = asset.materials or (BARE,)
         none = np.zeros(len(atlas.faces), np.int64)
         self.face_material = asset.face_material if asset.face_material is not None else none
-        pictures = [None if asset.uv is None else picture_of(entry, slot) for entry in self.materials]
+        pictures = [None if asset.uv is None else entry.pictures.get(slot) for entry in self.materials]
         old = np.zeros((len(atlas.faces), 3, 2)) if asset.uv is None else asset.uv[atlas.source_vertex[atlas.faces]]
         self.old_uv = old
         axes = texel_axes(atlas.corner_uv, old, size)
@@ -112,13 +111,13 @@ def base_color_map() -> Compute:
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
         colors = None if asset.colors is None else linear_colors(asset.colors)
         corners = atlas.source_vertex[atlas.faces]
-        blended = any(isinstance(entry, PbrMaterial) and entry.alpha_mode == "BLEND" for entry in used_materials(asset))
+        blended = any(entry.alpha_mode == "BLEND" for entry in used_materials(asset))
 
         def shade(
             material: Material, values: NDArray[np.float32] | None, texels: NDArray[np.int64]
         ) -> NDArray[np.float32]:
             result = np.ones((len(texels), 4), np.float32) if values is None else values
-            if colors is not None and (values is None or isinstance(material, PbrMaterial)):
+            if colors is not None and (values is None or material.tinted):
                 result = result * gbuffer.interpolate(colors, corners, texels)
             result = result * np.asarray(material.base_color_factor, np.float32)
             return with_alpha_mode(result, material, hard=blended)
@@ -130,7 +129,7 @@ def base_color_map() -> Compute:
 
 def with_alpha_mode(color: NDArray[np.float32], material: Material, *, hard: bool) -> NDArray[np.float32]:
     """(t, 4) RGBA as its material reads it: alpha 1 if opaque, its cut at ½ if masked (hard: cut), else as it is."""
-    if not isinstance(material, PbrMaterial) or material.alpha_mode == "BLEND":
+    if material.alpha_mode == "BLEND":
         return color
     if material.alpha_mode == "OPAQUE":
         color[:, 3] = 1.0
@@ -152,7 +151,7 @@ def metallic_roughness_map() -> Compute:
         def shade(
             material: Material, values: NDArray[np.float32] | None, texels: NDArray[np.int64]
         ) -> NDArray[np.float32]:
-            metallic, roughness = finish_of(material)
+            metallic, roughness = material.finish
             result = np.ones((len(texels), 3), np.float32)
             result[:, 1] = roughness * (1.0 if values is None else values[:, 1])
             result[:, 2] = metallic * (1.0 if values is None else values[:, 2])
@@ -161,11 +160,6 @@ def metallic_roughness_map() -> Compute:
         return ready(atlas, asset, "metallic-roughness", gbuffer.side).shaded(gbuffer, 3, shade)
 
     return compute
-
-
-def finish_of(material: Material) -> tuple[float, float]:
-    """Metallic and roughness factors."""
-    return (material.metallic, material.roughness) if isinstance(material, PbrMaterial) else DEFAULT_FINISH
 
 
 def occlusion_map() -> Compute:
@@ -179,7 +173,7 @@ def occlusion_map() -> Compute:
         def shade(
             material: Material, values: NDArray[np.float32] | None, texels: NDArray[np.int64]
         ) -> NDArray[np.float32]:
-            if values is None or not isinstance(material, PbrMaterial):
+            if values is None:
                 return np.ones((len(texels), 1), np.float32)
             return 1.0 + np.float32(material.occlusion_strength) * (values[:, :1] - 1.0)
 
@@ -201,7 +195,7 @@ def emissive_map() -> Compute:
         def shade(
             material: Material, values: NDArray[np.float32] | None, texels: NDArray[np.int64]
         ) -> NDArray[np.float32]:
-            factor = np.asarray(material.emissive if isinstance(material, PbrMaterial) else np.zeros(3), np.float32)
+            factor = np.asarray(material.emissive, np.float32)
             texture = np.ones((len(texels), 3), np.float32) if values is None else values[:, :3]
             return texture * factor * np.float32(scale)
 
@@ -212,12 +206,12 @@ def emissive_map() -> Compute:
 
 def emissive_strength(asset: Asset) -> float:
     """By what the emissive map must be multiplied: the largest emissive factor, at least 1."""
-    return max([1.0, *(max(entry.emissive) for entry in asset.materials if isinstance(entry, PbrMaterial))])
+    return max([1.0, *(max(entry.emissive) for entry in asset.materials)])
 
 
 def has_normal_texture(asset: Asset) -> bool:
     """Whether some material has a normal texture and the mesh the uv for it."""
-    return asset.uv is not None and any(picture_of(entry, "normal") is not None for entry in asset.materials)
+    return asset.uv is not None and any("normal" in entry.pictures for entry in asset.materials)
 
 
 def textured_normals() -> Callable[[GBuffer, Atlas, Asset, NDArray[np.int64]], NDArray[np.float32]]:
@@ -239,7 +233,7 @@ def textured_normals() -> Callable[[GBuffer, Atlas, Asset, NDArray[np.int64]], N
             values = slot.values(gbuffer, texels[chosen], int(index))
             if values is not None:
                 local[chosen] = values[:, :3]
-                local[chosen, :2] *= np.float32(getattr(slot.materials[int(index)], "normal_scale", 1.0))
+                local[chosen, :2] *= np.float32(slot.materials[int(index)].normal_scale)
         return from_tangent_space(local, frame)
 
     return compute

@@ -23,7 +23,7 @@ from ..color import byte_to_linear
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.io.materials import Picture, Wrap
+    from ...runtime.material import Picture, Wrap
 
 ROUNDING = 0.01
 """Powers of 2 by which a footprint may exceed a grid: uv in float32 make texels that are copied one by one uneven."""

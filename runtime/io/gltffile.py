@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..mesh import Material
+    from ..material import Material
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 

@@ -1,4 +1,4 @@
-"""Materials of a glTF 2.0 file → PbrMaterial: all five textures with their samplers, placements and factors.
+"""Materials of a glTF 2.0 file → Material: all five textures with their samplers, placements and factors.
 
 Words of the specification (Khronos, glTF 2.0.1): texture, sampler, textureInfo.  What can't be kept is counted.
 """
@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from ..material import SLOTS, UNTURNED, Material, Picture
 from .gltfbuffers import GltfFile, buffer_view, read_resource
-from .materials import SLOTS, UNTURNED, PbrMaterial, Picture, decode_image, finite
+from .materials import decode_image, finite
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from .materials import AlphaMode, Slot, Wrap
+    from ..material import AlphaMode, Placement, Slot, Wrap
 
 TRANSFORM = "KHR_texture_transform"
 STRENGTH = "KHR_materials_emissive_strength"
@@ -25,7 +26,7 @@ ALPHA_MODES: tuple[AlphaMode, ...] = ("OPAQUE", "MASK", "BLEND")
 COUNTS = ("missing_textures", "textures_of_other_uv")
 
 
-def read_materials(file: GltfFile) -> tuple[list[PbrMaterial], dict[str, int]]:
+def read_materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
     """All materials of the file, and what could not be kept.
 
     Counted are textures whose picture can't be had, and textures on another uv set than the material's first one.
@@ -67,7 +68,7 @@ def _material(
     index: int,
     known: dict[int, NDArray[np.uint8]],
     changes: dict[str, int],
-) -> PbrMaterial:
+) -> Material:
     """One material; known and changes grow."""
     infos, first = _texture_infos(entry), uv_set(entry)
     pictures: dict[Slot, Picture] = {}
@@ -82,10 +83,9 @@ def _material(
     strength = max(finite(entry.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0)), 0.0)
     glow = tuple(_unit(value) * strength for value in entry.get("emissiveFactor", (0.0, 0.0, 0.0)))
     mode = entry.get("alphaMode", "OPAQUE")
-    return PbrMaterial(
+    return Material(
         name=str(entry.get("name", f"material_{index}")),
         base_color_factor=(red, green, blue, alpha),
-        base_color=pictures["base-color"].pixels if "base-color" in pictures else None,
         pictures=pictures,
         metallic=_unit(surface.get("metallicFactor", 1.0)),
         roughness=_unit(surface.get("roughnessFactor", 1.0)),
@@ -128,9 +128,7 @@ def _picture(file: GltfFile, info: dict[str, Any], pixels: NDArray[np.uint8]) ->
     return Picture(pixels, wrap, placement, smooth=sampler.get("magFilter") != NEAREST)
 
 
-def _placement(
-    transform: dict[str, Any],
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def _placement(transform: dict[str, Any]) -> Placement:
     """KHR_texture_transform (v down: translate · rotate · scale) as rows for uv that are v up.
 
     With v' = 1 − v the matrix keeps its form: both off-diagonal terms change sign, and the offset along v takes what

@@ -1,110 +1,32 @@
-"""Materials with all their textures, and the pictures beside a mesh file: OBJ libraries, files of one folder only.
+"""OBJ material libraries, and the pictures beside a mesh file: files of one folder only.
 
-Words are those of glTF 2.0 (metallic-roughness model): a slot is what a texture is for.  Pictures are (h, w, 4) uint8
-as stored, row 0 = top: sRGB in the slots base-color and emissive, data in the others.  Factors are linear.
 A mesh file may come from anyone: names in it reach no file outside its own folder, and no network.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import PureWindowsPath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
 from ..errors import MeshError
-from ..mesh import Material
+from ..material import Material, Picture, seen_through
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ..mesh import Asset
+    from ..material import Slot, Wrap
 
 MAX_PIXELS = 16384 * 16384
 
-Wrap = Literal["repeat", "mirror", "clamp"]
-Slot = Literal["base-color", "metallic-roughness", "normal", "emissive", "occlusion"]
-AlphaMode = Literal["OPAQUE", "MASK", "BLEND"]
-SLOTS: tuple[Slot, ...] = ("base-color", "metallic-roughness", "normal", "emissive", "occlusion")
 MTL_SLOTS: dict[str, Slot] = {"map_kd": "base-color", "map_ke": "emissive", "norm": "normal"}
-UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A texture as a material uses it.
-
-    pixels: (h, w, 4) uint8 as stored, row 0 = top.  wrap: what lies outside [0, 1] along u and along v.
-    placement: rows (a, b, c) of picture uv = (a u + b v + c, …), both v up: what KHR_texture_transform asks.
-    smooth: whether it is filtered; False is nearest texel (pixel art).
-    """
-
-    pixels: NDArray[np.uint8]
-    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
-    placement: tuple[tuple[float, float, float], tuple[float, float, float]] = UNTURNED
-    smooth: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class PbrMaterial(Material):
-    """A material with all that glTF 2.0 says about it; `base_color` is the picture of its slot once more.
-
-    pictures: by slot.  metallic, roughness, occlusion_strength: [0, 1].  normal_scale: any number.
-    emissive: linear RGB factor ≥ 0, above 1 where the file asks for more (KHR_materials_emissive_strength).
-    alpha_mode: OPAQUE ignores alpha, MASK cuts at alpha_cutoff.  double_sided: seen from behind too.
-    """
-
-    pictures: Mapping[Slot, Picture] = field(default_factory=dict)
-    metallic: float = 1.0
-    roughness: float = 1.0
-    normal_scale: float = 1.0
-    occlusion_strength: float = 1.0
-    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    alpha_mode: AlphaMode = "OPAQUE"
-    alpha_cutoff: float = 0.5
-    double_sided: bool = False
-
-
-def picture_of(material: Material, slot: Slot) -> Picture | None:
-    """The material's texture of that slot, or None; a plain Material has a base colour at most, repeated."""
-    if isinstance(material, PbrMaterial):
-        return material.pictures.get(slot)
-    return Picture(material.base_color) if slot == "base-color" and material.base_color is not None else None
-
-
-def source_maps(asset: Asset) -> tuple[str, ...]:
-    """The maps that together make the output look like the source, beside a normal map; () for a bare surface.
-
-    base-color where there is colour, orm where both occlusion and a metallic-roughness that varies are there, else the
-    one that is, emissive where something glows.  What is the same all over needs no map: it stays a factor.
-    """
-    used = used_materials(asset)
-    has = {slot: asset.uv is not None and any(picture_of(entry, slot) for entry in used) for slot in SLOTS}
-    finishes = {(entry.metallic, entry.roughness) for entry in used if isinstance(entry, PbrMaterial)}
-    finish = has["metallic-roughness"] or len(finishes) > 1
-    glows = {entry.emissive for entry in used if isinstance(entry, PbrMaterial)}
-    colors = {entry.base_color_factor for entry in used}
-    names = ["base-color"] if has["base-color"] or asset.colors is not None or len(colors) > 1 else []
-    if finish and has["occlusion"]:
-        names.append("orm")
-    else:
-        names += [name for name, there in (("metallic-roughness", finish), ("occlusion", has["occlusion"])) if there]
-    return (*names, *(["emissive"] if has["emissive"] or len(glows) > 1 else []))
-
-
-def used_materials(asset: Asset) -> list[Material]:
-    """The materials that some face has; the first one where faces do not say."""
-    if asset.face_material is None:
-        return list(asset.materials[:1])
-    return [asset.materials[int(index)] for index in np.unique(asset.face_material)]
 
 
 def read_in_folder(folder: Path, name: str) -> bytes | None:
@@ -177,23 +99,18 @@ def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[
 
 
 def _mtl_material(name: str, fields: Mapping[str, str], pictures: Mapping[Slot, Picture]) -> Material:
-    """A plain Material where the library says no more than a colour, repeated."""
     base = pictures.get("base-color")
-    factor, pixels = _factor(fields, base is not None), None if base is None else base.pixels
-    simple = set(pictures) <= {"base-color"} and not {"ke", "pm", "pr"} & set(fields)
-    if simple and (base is None or base.wrap == ("repeat", "repeat")):
-        return Material(name=name, base_color_factor=factor, base_color=pixels)
-    clear = factor[3] < 1.0 or (pixels is not None and int(pixels[..., 3].min()) < 255)
+    factor = _factor(fields, base is not None)
     red, green, blue = _numbers(fields.get("ke", "1 1 1" if "emissive" in pictures else "0 0 0"))
-    return PbrMaterial(
+    return Material(
         name=name,
         base_color_factor=factor,
-        base_color=pixels,
         pictures=pictures,
         metallic=_numbers(fields.get("pm", "0"))[0],
         roughness=_numbers(fields.get("pr", "0.8"))[0],
         emissive=(red, green, blue),
-        alpha_mode="BLEND" if clear else "OPAQUE",
+        alpha_mode="BLEND" if seen_through(factor, base) else "OPAQUE",
+        tinted=False,
     )
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import MeshError
-from ..mesh import Material
+from ..material import Material
 from .materials import read_mtl
 from .rawmesh import RawMesh
 

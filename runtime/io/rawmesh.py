@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import MeshError, ShapeError
-from ..mesh import Material
+from ..material import Material
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -19,7 +19,7 @@ from trimesh.exchange.load import mesh_loaders
 from trimesh.resolvers import Resolver
 
 from ..errors import InputError, MeshError, MissingDependencyError
-from ..mesh import Material
+from ..material import Material, Picture, seen_through
 from .materials import picture_pixels, read_in_folder
 from .rawmesh import RawMesh, as_rgba, merge, split_at_corners, transformed, unit_vectors
 
@@ -184,13 +184,16 @@ def _material(source: Any) -> Material | None:
     image = getattr(source, "image", None) if image is None else image
     color = getattr(source, "baseColorFactor", None)
     color = getattr(source, "diffuse", None) if color is None else color
-    picture = picture_pixels(image) if image is not None and image.format is not None else None
+    pixels = picture_pixels(image) if image is not None and image.format is not None else None
     factor = np.full(4, 255, dtype=np.uint8) if color is None else as_rgba(np.atleast_2d(color))[0]
-    if picture is None and (color is None or factor.tolist() == MADE_UP_GREY):
+    if pixels is None and (color is None or factor.tolist() == MADE_UP_GREY):
         return None
-    red, green, blue, alpha = (1.0, 1.0, 1.0, 1.0) if picture is not None else (factor / 255.0).tolist()
+    red, green, blue, alpha = (1.0, 1.0, 1.0, 1.0) if pixels is not None else (factor / 255.0).tolist()
+    picture = None if pixels is None else Picture(pixels)
     return Material(
         name=str(getattr(source, "name", None) or "material"),
         base_color_factor=(red, green, blue, alpha),
-        base_color=picture,
+        pictures={} if picture is None else {"base-color": picture},
+        alpha_mode="BLEND" if seen_through((red, green, blue, alpha), picture) else "OPAQUE",
+        tinted=False,
     )

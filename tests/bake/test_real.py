@@ -13,7 +13,8 @@ from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.pictures.preview import preview_pixels
 from flexpara.runtime.geometry.metrics import face_distortion
 from flexpara.runtime.io.meshfile import load_asset
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import Material, Picture
+from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.pack.packing import atlas_from_uv
 
 Pair = tuple[Atlas, Asset]
@@ -50,7 +51,9 @@ def test_a_texture_resampled_onto_its_own_uv_is_itself(spot: Pair) -> None:
     image = np.random.default_rng(0).integers(0, 256, (256, 256, 4)).astype(np.uint8)
     image[..., 3] = 255
     textured = replace(
-        asset, materials=(Material(base_color=image),), face_material=np.zeros(len(asset.faces), np.int64)
+        asset,
+        materials=(Material(pictures={"base-color": Picture(image)}),),
+        face_material=np.zeros(len(asset.faces), np.int64),
     )
     buffer = make_gbuffer(atlas, 256)
     from_source = bake(atlas, textured, ["base-color"], size=256, padding=0)["base-color"]
@@ -71,9 +74,8 @@ def test_a_glb_read_back_gives_the_same_bake(spot: Pair, tmp_path: Path) -> None
     first = bake(atlas, asset, ["position"], size=256, padding=2)["position"].pixels
     second = bake(atlas_from_uv(again), again, ["position"], size=256, padding=2)["position"].pixels
     assert (np.abs(first - second).max(axis=-1) > 1e-4).mean() < 1e-3  # texel centres on an edge may change sides
-    assert again.materials[0].base_color is not None
     card = bake(atlas, asset, ["uv-checker"], size=64)["uv-checker"].pixels
-    assert np.abs(again.materials[0].base_color[..., :3] / 255.0 - card ** (1 / 2.4)).mean() < 0.05
+    assert np.abs(again.materials[0].pictures["base-color"].pixels[..., :3] / 255.0 - card ** (1 / 2.4)).mean() < 0.05
 
 
 def test_the_preview_of_a_real_mesh_is_no_empty_page(spot: Pair) -> None:

@@ -16,7 +16,7 @@ from flexpara.bake.files.images import quantize
 from flexpara.bake.maps.material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
 from flexpara.bake.maps.normals import object_normal_map
 from flexpara.bake.maps.tangents import split_by_tangents
-from flexpara.runtime.io.materials import PbrMaterial, Picture
+from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas
 
 
@@ -80,7 +80,7 @@ def rebaked(atlas: Atlas, asset: Asset, size: int) -> Asset:
         rgb = np.broadcast_to(pixels, (*pixels.shape[:2], 3)) if pixels.shape[2] == 1 else pixels
         rgba = np.concatenate([rgb, np.full((*pixels.shape[:2], 1), 255, np.uint8)], -1).astype(np.uint8)
         pictures[name] = Picture(rgba, ("clamp", "clamp"))
-    material = PbrMaterial(pictures=pictures, emissive=(1.0, 1.0, 1.0))
+    material = Material(pictures=pictures, metallic=1.0, roughness=1.0, emissive=(1.0, 1.0, 1.0))
     assert asset.normals is not None
     return Asset(
         positions=atlas.positions,

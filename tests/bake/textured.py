@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import xatlas
 
-from flexpara.runtime.io.materials import PbrMaterial, Picture
+from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 REPEATS = (2, 1)
 
 
-def torus_asset(material: PbrMaterial, *, columns: int = 48, rows: int = 24) -> Asset:
+def torus_asset(material: Material, *, columns: int = 48, rows: int = 24) -> Asset:
     """Radii 2 and 1 about the z axis; old uv run from 0 to `REPEATS`, cut along both circles."""
     u, v = (line.reshape(-1) for line in np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1)))
     turn, lean = 2 * np.pi * u, 2 * np.pi * v
@@ -60,7 +60,7 @@ def new_atlas(asset: Asset, size: int) -> Atlas:
     )
 
 
-def rich_material(size: int, *, wrap: Any = ("repeat", "repeat"), **changes: Any) -> PbrMaterial:
+def rich_material(size: int, *, wrap: Any = ("repeat", "repeat"), **changes: Any) -> Material:
     """All five textures, none symmetric; the base colour has the spectrum of photographs (amplitude 1 / frequency)."""
     row, column = np.mgrid[0:size, 0:size] / size
     smooth = 0.5 + 0.4 * np.sin(2 * np.pi * (3 * column + row)) * np.cos(2 * np.pi * 2 * row)
@@ -77,7 +77,7 @@ def rich_material(size: int, *, wrap: Any = ("repeat", "repeat"), **changes: Any
     }
     opaque = np.full((size, size, 1), 255, np.uint8)
     pictures: Any = {slot: Picture(np.concatenate([pixels, opaque], -1), wrap) for slot, pixels in textures.items()}
-    return PbrMaterial(pictures=pictures, base_color=pictures["base-color"].pixels, **changes)
+    return Material(pictures=pictures, metallic=1.0, roughness=1.0, **changes)
 
 
 def pink_noise(size: int) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.mesh import Asset, Material, Surface
+from flexpara.runtime.material import Material, Picture
+from flexpara.runtime.mesh import Asset, Surface
 from flexpara.runtime.options import Options, Outputs
 
 SURFACE = Surface(np.eye(3), np.array([[0, 1, 2]]))
@@ -64,7 +65,7 @@ def test_an_unknown_format_is_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_auto_shows_the_colours_of_the_source_or_else_a_checker() -> None:
-    picture = Material(base_color=np.zeros((1, 1, 4), np.uint8))
+    picture = Material(pictures={"base-color": Picture(np.zeros((1, 1, 4), np.uint8))})
     assert Outputs().for_asset(asset()).maps == ("normal", "position", "uv-checker")
     assert Outputs().for_asset(asset(materials=(Material(),))).maps[-1] == "uv-checker"
     assert Outputs().for_asset(asset(materials=(picture,), uv=np.zeros((3, 2)))).maps[-1] == "base-color"

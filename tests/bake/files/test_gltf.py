@@ -19,9 +19,9 @@ from flexpara.bake.files.gltf import glb_bytes, write_glb
 from flexpara.bake.files.images import quantize, read_image
 from flexpara.bake.maps.tangents import vertex_tangents
 from flexpara.runtime.errors import ShapeError
-from flexpara.runtime.io.materials import SLOTS, PbrMaterial, Picture
 from flexpara.runtime.io.meshfile import load_asset
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import SLOTS, Material, Picture
+from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
 
@@ -252,7 +252,7 @@ def textured_pair(pair: Pair, **changes: Any) -> Pair:
     atlas, asset = pair
     noise = np.random.default_rng(1).integers(0, 256, (8, 8, 4)).astype(np.uint8)
     pictures: Any = {slot: Picture(noise) for slot in SLOTS}
-    material = PbrMaterial("rich", pictures=pictures, base_color=noise, **{"emissive": (1.0, 0.5, 0.0), **changes})
+    material = Material("rich", pictures=pictures, **{"emissive": (1.0, 0.5, 0.0), **changes})
     return atlas, replace(asset, uv=atlas.uv.astype(np.float64) * 3, materials=(material,))
 
 
@@ -269,7 +269,7 @@ def test_the_validator_accepts_every_texture_and_alpha_mode(
 @pytest.mark.parametrize("changes", [{}, {"alpha_mode": "MASK", "alpha_cutoff": 0.3}, {"emissive": (8.0, 1.0, 0.0)}])
 def test_the_validator_accepts_factors_alone(sphere: Pair, tmp_path: Path, changes: dict[str, Any]) -> None:
     atlas, asset = sphere
-    material = PbrMaterial("bare", (0.5, 0.25, 1.0, 0.5), metallic=0.75, roughness=0.125, **changes)
+    material = Material("bare", (0.5, 0.25, 1.0, 0.5), metallic=0.75, roughness=0.125, **changes)
     write_glb(atlas, replace(asset, materials=(material,)), {}, tmp_path / "a.glb")
     assert_valid(tmp_path / "a.glb")
     (again,) = load_asset(tmp_path / "a.glb").materials
@@ -303,7 +303,6 @@ def test_what_was_written_is_read_again(sphere: Pair, tmp_path: Path) -> None:
     textures = bake(*pair, SURFACE_MAPS, size=16)
     write_glb(*pair, textures, tmp_path / "a.glb")
     (material,) = load_asset(tmp_path / "a.glb").materials
-    assert isinstance(material, PbrMaterial)
     assert set(material.pictures) == set(SLOTS)
     assert {picture.wrap for picture in material.pictures.values()} == {("clamp", "clamp")}
     assert material.alpha_mode == "BLEND"

@@ -18,7 +18,7 @@ from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.files.images import Texture, read_image
 from flexpara.bake.files.targets import TARGETS, find_target, packed_textures, prepare, with_green, write_target
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.io.materials import PbrMaterial, Picture
+from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
@@ -51,7 +51,7 @@ def turned(quad: Pair) -> Pair:
     atlas, asset = quad
     opaque = np.full((SIZE, SIZE, 1), 255, np.uint8)
     pictures: Any = {slot: Picture(np.concatenate([pixels, opaque], -1)) for slot, pixels in card().items()}
-    material = PbrMaterial("card", pictures=pictures, emissive=(1.0, 1.0, 1.0))
+    material = Material("card", pictures=pictures, metallic=1.0, roughness=1.0, emissive=(1.0, 1.0, 1.0))
     new = np.column_stack([atlas.uv[:, 1], 1 - atlas.uv[:, 0]])
     return replace(atlas, uv=new), replace(asset, uv=atlas.uv.astype(np.float64), materials=(material,))
 

@@ -12,8 +12,8 @@ import pytest
 from flexpara.bake.baker import bake
 from flexpara.bake.files.targets import USD, write_target
 from flexpara.bake.files.usd import prim_name, usda_text, write_usda
-from flexpara.runtime.io.materials import SLOTS, PbrMaterial, Picture
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import SLOTS, Material, Picture
+from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
 
@@ -29,7 +29,7 @@ def rich(pair: Pair, **changes: Any) -> Pair:
     atlas, asset = pair
     noise = np.random.default_rng(1).integers(0, 256, (8, 8, 4)).astype(np.uint8)
     pictures: Any = {slot: Picture(noise) for slot in SLOTS}
-    material = PbrMaterial("rich", pictures=pictures, **{"emissive": (4.0, 1.0, 0.0), **changes})
+    material = Material("rich", pictures=pictures, **{"emissive": (4.0, 1.0, 0.0), **changes})
     return atlas, replace(asset, uv=atlas.uv.astype(np.float64), materials=(material,))
 
 
@@ -105,7 +105,7 @@ def test_pixar_s_validators_have_no_complaint(sphere: Pair, tmp_path: Path) -> N
 
 
 def test_factors_stand_where_no_texture_is(quad: Pair) -> None:
-    material = PbrMaterial("m", (0.5, 0.25, 0.125, 0.75), metallic=0.5, roughness=0.375, emissive=(2.0, 0.0, 1.0))
+    material = Material("m", (0.5, 0.25, 0.125, 0.75), metallic=0.5, roughness=0.375, emissive=(2.0, 0.0, 1.0))
     text = usda_text(quad[0], replace(quad[1], materials=(material,)), {})
     for line in (
         "diffuseColor = (0.5, 0.25, 0.125)",

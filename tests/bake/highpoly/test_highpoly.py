@@ -16,7 +16,8 @@ from flexpara.bake.highpoly.highpoly import bake_from_high, first_front
 from flexpara.bake.maps.rays import RayScene
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.mesh import Asset, Atlas, Frame, Material, Surface
+from flexpara.runtime.material import Material
+from flexpara.runtime.mesh import Asset, Atlas, Frame, Surface
 from flexpara.runtime.pack.packing import atlas_from_uv
 from flexpara.runtime.samples import make_sample
 

@@ -7,7 +7,8 @@ import pytest
 
 from flexpara.bake.highpoly.parts import face_parts, matching_faces, part_name
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.mesh import Asset, Material, Surface
+from flexpara.runtime.material import Material
+from flexpara.runtime.mesh import Asset, Surface
 
 
 def mesh(stem: str, *materials: str, face_material: list[int] | None = None, faces: int = 2) -> Asset:

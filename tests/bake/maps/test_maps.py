@@ -14,7 +14,8 @@ from flexpara.bake.maps.normals import to_tangent_space
 from flexpara.bake.maps.tangents import unit
 from flexpara.bake.raster.gbuffer import GBuffer, rasterize
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import Material
+from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
 
@@ -161,5 +162,5 @@ def test_base_colour_drops_an_alpha_of_1(quad: Pair, buffer: GBuffer) -> None:
     opaque = replace(asset, materials=(Material(base_color_factor=(0.2, 0.4, 0.6, 1.0)),))
     pixels = find_map("base-color").compute(buffer, atlas, opaque)
     np.testing.assert_allclose(pixels, np.broadcast_to([0.2, 0.4, 0.6], (16, 16, 3)), atol=1e-7)
-    clear = replace(asset, materials=(Material(base_color_factor=(0.2, 0.4, 0.6, 0.5)),))
+    clear = replace(asset, materials=(Material(base_color_factor=(0.2, 0.4, 0.6, 0.5), alpha_mode="BLEND"),))
     assert find_map("base-color").compute(buffer, atlas, clear).shape == (16, 16, 4)

@@ -13,8 +13,8 @@ from flexpara.bake.color import chart_colors
 from flexpara.bake.maps.marks import distortion_map, face_id_map, material_id_map, orm_map
 from flexpara.bake.maps.material import metallic_roughness_map, occlusion_map
 from flexpara.bake.raster.gbuffer import rasterize
-from flexpara.runtime.io.materials import SLOTS, PbrMaterial, Picture
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import SLOTS, Material, Picture
+from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
 
@@ -58,7 +58,7 @@ def test_orm_holds_occlusion_and_finish(quad: Pair, context: moderngl.Context) -
     atlas, asset = quad
     noise = np.random.default_rng(1).integers(0, 256, (8, 8, 4)).astype(np.uint8)
     pictures: Any = {slot: Picture(noise) for slot in SLOTS}
-    rich = replace(asset, uv=atlas.uv.astype(np.float64), materials=(PbrMaterial(pictures=pictures),))
+    rich = replace(asset, uv=atlas.uv.astype(np.float64), materials=(Material(pictures=pictures),))
     buffer = rasterize(context, atlas, 16)
     packed = orm_map()(buffer, atlas, rich)
     np.testing.assert_array_equal(packed[..., 0], occlusion_map()(buffer, atlas, rich)[..., 0])

@@ -22,8 +22,8 @@ from flexpara.bake.maps.normals import tangent_normal_map, to_tangent_space
 from flexpara.bake.maps.resample import linear_colors
 from flexpara.bake.maps.tangents import unit
 from flexpara.bake.raster.gbuffer import GBuffer, rasterize
-from flexpara.runtime.io.materials import PbrMaterial, Picture
-from flexpara.runtime.mesh import Asset, Atlas, Material
+from flexpara.runtime.material import Material, Picture
+from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]
 
@@ -47,14 +47,14 @@ def buffer(quad: Pair, context: moderngl.Context) -> GBuffer:
 def with_material(pair: Pair, **changes: Any) -> Pair:
     """The pair with its own uv as the old ones, and one material."""
     atlas, asset = pair
-    return atlas, replace(asset, uv=atlas.uv.astype(np.float64), materials=(PbrMaterial(**changes),))
+    return atlas, replace(asset, uv=atlas.uv.astype(np.float64), materials=(Material(**changes),))
 
 
 def test_a_texture_under_turned_uv_is_turned(quad: Pair, context: moderngl.Context) -> None:
     atlas, asset = quad
     image = noise(16, 16)
     turned = np.column_stack([atlas.uv[:, 1], 1 - atlas.uv[:, 0]]).astype(np.float64)  # old uv of each corner
-    asset = replace(asset, uv=turned, materials=(Material(base_color=image),))
+    asset = replace(asset, uv=turned, materials=(Material(pictures={"base-color": Picture(image)}),))
     color = base_color_map()(rasterize(context, atlas, 16), atlas, asset)
     np.testing.assert_allclose(color, np.rot90(linear_colors(image), 1), atol=1e-4)
 
@@ -63,7 +63,9 @@ def test_far_uv_tiles_keep_their_digits(quad: Pair, context: moderngl.Context) -
     atlas, asset = quad
     image = noise(16, 16)
     buffer = rasterize(context, atlas, 16)
-    near = replace(asset, uv=atlas.uv.astype(np.float64), materials=(Material(base_color=image),))
+    near = replace(
+        asset, uv=atlas.uv.astype(np.float64), materials=(Material(pictures={"base-color": Picture(image)}),)
+    )
     far = replace(near, uv=atlas.uv.astype(np.float64) + np.array([4000.0, -7000.0]))
     np.testing.assert_allclose(base_color_map()(buffer, atlas, far), base_color_map()(buffer, atlas, near), atol=1e-4)
 

@@ -17,7 +17,7 @@ from flexpara.bake.maps.resample import (
     texel_axes,
     wrapped,
 )
-from flexpara.runtime.io.materials import Picture
+from flexpara.runtime.material import Picture
 
 
 def noise(height: int, width: int) -> np.ndarray:

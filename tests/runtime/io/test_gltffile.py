@@ -177,7 +177,7 @@ def textured(picture: np.ndarray) -> Maker:
 def test_a_material_brings_its_picture_and_its_own_uv_set(tmp_path: Path) -> None:
     picture = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
     raw = read_gltf(textured(picture).glb(), tmp_path)
-    np.testing.assert_array_equal(raw.materials[0].base_color, picture)
+    np.testing.assert_array_equal(raw.materials[0].pictures["base-color"].pixels, picture)
     assert raw.materials[0].base_color_factor == (0.5, 1.0, 1.0, 1.0)
     np.testing.assert_array_equal(raw.uv, TRIANGLE[:, 1:] * [1, -1] + [0, 1])
 

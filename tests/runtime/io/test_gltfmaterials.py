@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,8 @@ from PIL import Image
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.gltfbuffers import GltfFile
 from flexpara.runtime.io.gltfmaterials import read_materials, uv_set
-from flexpara.runtime.io.materials import SLOTS, PbrMaterial, Picture, picture_of, source_maps
-from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.mesh import Material
+from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.material import SLOTS, Material
 
 TEXTURES = {
     "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}},
@@ -33,7 +31,7 @@ def picture_uri(level: int) -> str:
     return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()
 
 
-def read(*materials: dict[str, Any], **tree: Any) -> tuple[list[PbrMaterial], dict[str, int]]:
+def read(*materials: dict[str, Any], **tree: Any) -> tuple[list[Material], dict[str, int]]:
     whole: dict[str, Any] = {
         "materials": list(materials),
         "textures": [{"source": 0}, {"source": 1, "sampler": 0}],
@@ -49,8 +47,7 @@ def test_every_slot_is_read() -> None:
     assert set(material.pictures) == set(SLOTS)
     levels = {slot: int(picture.pixels[0, 0, 0]) for slot, picture in material.pictures.items()}
     assert levels == {"base-color": 10, "metallic-roughness": 20, "normal": 10, "emissive": 20, "occlusion": 10}
-    assert material.base_color is material.pictures["base-color"].pixels
-    assert material.pictures["normal"].pixels is material.base_color  # decoded once
+    assert material.pictures["normal"].pixels is material.pictures["base-color"].pixels  # decoded once
     assert (material.normal_scale, material.occlusion_strength) == (0.5, 0.25)
     assert not any(changes.values())
 
@@ -124,28 +121,3 @@ def test_broken_materials_are_bad_input(tmp_path: Path, entry: str) -> None:
     path.write_text(f'{{"asset": {{"version": "2.0"}}, "materials": [{{{entry}}}]}}')
     with pytest.raises(MeshError, match="damaged"):
         load_asset(path)
-
-
-def test_a_plain_material_has_a_base_colour_at_most() -> None:
-    pixels = np.zeros((1, 1, 4), np.uint8)
-    found = picture_of(Material(base_color=pixels), "base-color")
-    assert found is not None
-    assert found.pixels is pixels
-    assert picture_of(Material(base_color=pixels), "normal") is None
-
-
-def asset_with(*materials: Material, uv: bool = True) -> Any:
-    asset = asset_from_arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    corners = np.zeros((len(asset.positions), 2)) if uv else None
-    return replace(asset, materials=materials, uv=corners, face_material=np.arange(2) % len(materials))
-
-
-def test_the_source_s_maps_are_those_that_vary() -> None:
-    picture = Picture(np.zeros((1, 1, 4), np.uint8))
-    full = PbrMaterial(pictures=dict.fromkeys(SLOTS, picture))
-    assert source_maps(asset_with(full)) == ("base-color", "orm", "emissive")
-    assert source_maps(asset_with(full, uv=False)) == ()
-    assert source_maps(asset_with(PbrMaterial())) == ()
-    assert source_maps(asset_with(PbrMaterial(metallic=0.0), PbrMaterial())) == ("metallic-roughness",)
-    assert source_maps(asset_with(PbrMaterial(pictures={"occlusion": picture}))) == ("occlusion",)
-    assert source_maps(asset_with(Material(), Material(base_color_factor=(1, 0, 0, 1)))) == ("base-color",)

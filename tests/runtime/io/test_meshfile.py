@@ -47,7 +47,7 @@ def test_a_solid_reads_the_same_from_every_format(tmp_path: Path, kind: str) -> 
     assert asset.uv is None
     assert asset.stem == "a"
     assert asset.sha256 == hashlib.sha256((tmp_path / f"a.{kind}").read_bytes()).hexdigest()
-    assert all(material.base_color is None for material in asset.materials)
+    assert not any(material.pictures for material in asset.materials)
 
 
 def test_extensions_are_read_in_any_case(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_ply_with_uv_per_corner_splits_there_and_takes_the_texture(tmp_path: Pat
     np.testing.assert_array_equal(asset.uv[asset.faces], [[[0, 0], [1, 0], [1, 1]], [[0.5, 0.5], [1, 1], [0, 1]]])
     assert len(asset.positions) == 5
     assert asset.changes == {"welded_vertices": 1}
-    np.testing.assert_array_equal(asset.materials[0].base_color, np.full((2, 2, 4), 77))
+    np.testing.assert_array_equal(asset.materials[0].pictures["base-color"].pixels, np.full((2, 2, 4), 77))
 
 
 def test_face_colours_are_dropped_and_counted(tmp_path: Path) -> None:
@@ -178,10 +178,11 @@ def test_an_obj_reaches_no_picture_outside_its_folder(tmp_path: Path, name: str)
     (folder / "a.mtl").write_text(f"newmtl m\nmap_Kd {name}\n")
     (folder / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
     asset = load_asset(folder / "a.obj")
-    assert asset.materials[0].base_color is None
+    assert not asset.materials[0].pictures
     assert asset.changes == {"missing_textures": 1}
     Image.fromarray(np.full((1, 1, 4), 9, dtype=np.uint8)).save(folder / "skin.png")
-    np.testing.assert_array_equal(load_asset(folder / "a.obj").materials[0].base_color, [[[9, 9, 9, 9]]])
+    (material,) = load_asset(folder / "a.obj").materials
+    np.testing.assert_array_equal(material.pictures["base-color"].pixels, [[[9, 9, 9, 9]]])
 
 
 def test_arrays_are_cleaned_like_files() -> None:

@@ -104,7 +104,7 @@ def test_a_texture_is_read_with_row_0_on_top() -> None:
     Image.fromarray(pixels).save(stream, format="PNG")
     files = {"a.mtl": b"newmtl m\nKd 0.1 0.1 0.1\nmap_Kd -s 1 1 1 skin.png\n", "skin.png": stream.getvalue()}
     raw = read(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", files.get)
-    np.testing.assert_array_equal(raw.materials[0].base_color, pixels)
+    np.testing.assert_array_equal(raw.materials[0].pictures["base-color"].pixels, pixels)
     assert raw.materials[0].base_color_factor == (1.0, 1.0, 1.0, 1.0)
 
 

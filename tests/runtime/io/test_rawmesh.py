@@ -8,7 +8,7 @@ import pytest
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.cleaning import clean
 from flexpara.runtime.io.rawmesh import MAX_FACES, RawMesh, check, merge, split_at_corners, transformed
-from flexpara.runtime.mesh import Material
+from flexpara.runtime.material import Material
 from flexpara.runtime.samples import make_sample
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
