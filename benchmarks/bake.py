@@ -33,11 +33,11 @@ from flexpara.bake.maps.maps import find_map
 from flexpara.bake.maps.occlusion import ambient_occlusion, starting_points
 from flexpara.bake.maps.rays import BATCH, RayScene, RaySettings, cosine_directions, pattern_of, sphere_patterns
 from flexpara.bake.maps.tangents import vertex_tangents
+from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.io.meshwrite import write_ply
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.pack.packing import atlas_from_uv
-from flexpara.runtime.pack.seams import smooth_normals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .geometry.triangles import triangle_areas, triangle_cross, triangle_normals
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -36,17 +38,15 @@ class Surface:
 
     def face_cross(self) -> NDArray[np.float64]:
         """(f, 3) float64 edge cross products: direction = face normal, length = twice the area."""
-        corner = self.triangles
-        return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        return triangle_cross(self.triangles)
 
     def face_areas(self) -> NDArray[np.float64]:
         """(f,) float64 in source units squared."""
-        return 0.5 * np.linalg.norm(self.face_cross(), axis=1)
+        return triangle_areas(self.triangles)
 
     def face_normals(self) -> NDArray[np.float64]:
         """(f, 3) float64 unit normals, right-handed (zero for a face of zero area)."""
-        cross = self.face_cross()
-        return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        return triangle_normals(self.triangles)
 
 
 @dataclass(frozen=True)

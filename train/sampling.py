@@ -43,14 +43,3 @@ def samples_in_faces(surface: Surface, face: NDArray[np.int64], rng: np.random.G
     barycentric = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
     xyz = np.einsum("nc,ncd->nd", barycentric, surface.triangles[face])
     return Samples(xyz=xyz, face=face, barycentric=barycentric, normal=surface.face_normals()[face])
-
-
-def tangent_frames(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Right-handed tangents (2, n, 3): t₁ × t₂ = normal, for unit normals (n, 3).  Duff et al. 2017, branchless ONB."""
-    x, y, z = normal.T
-    sign = np.copysign(1.0, z)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    second = np.stack([b, sign + y * y * a, -y], axis=1)
-    return np.stack([first, second])

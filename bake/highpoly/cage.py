@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.errors import InputError
-from ...runtime.pack.seams import smooth_normals
+from ...runtime.geometry.normals import smooth_normals
+from ...runtime.geometry.triangles import triangle_cross
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,7 +96,7 @@ class Cage:
         faces = self.surface.faces
         point = gbuffer.interpolate(self.vertices, faces, texels)
         corner = self.vertices[faces[gbuffer.face.reshape(-1)[texels]]]
-        facing = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).astype(np.float32)
+        facing = triangle_cross(corner).astype(np.float32)
         normal = _unit_or(gbuffer.interpolate(self.normals, faces, texels), facing)
         if self.starts is None or self.start_faces is None:
             length = np.full(len(texels), self.reach, np.float32)

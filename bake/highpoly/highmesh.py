@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...runtime.geometry.normals import smooth_normals
+from ...runtime.geometry.triangles import signed_areas, triangle_areas
 from ...runtime.material import Material
 from ...runtime.mesh import Asset, Atlas, Surface
-from ...runtime.pack.seams import smooth_normals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,9 +79,7 @@ def atlas_of(asset: Asset, density: float) -> Atlas:
 
 def uv_per_unit(triangles: NDArray[np.float64], corner_uv: NDArray[np.float64]) -> float:
     """Length in uv of a source unit, on average over faces (f, 3, 3) with uv (f, 3, 2); 0 without uv area."""
-    edges, flat = triangles[:, 1:] - triangles[:, :1], corner_uv[:, 1:] - corner_uv[:, :1]
-    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
-    uv_area = np.abs(flat[:, 0, 0] * flat[:, 1, 1] - flat[:, 0, 1] * flat[:, 1, 0]).sum()
+    area, uv_area = triangle_areas(triangles).sum(), np.abs(signed_areas(corner_uv)).sum()
     return float(np.sqrt(uv_area / max(area, np.finfo(np.float64).tiny)))
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.triangles import triangle_cross
 from ...runtime.mesh import Frame, Surface
 from ..maps.rays import BATCH, Hits, RayScene, in_batches
 from .cage import Cage, CageSettings, Rays
@@ -179,7 +180,7 @@ class Projector:
         length = np.linalg.norm(normal, axis=1)
         lost = np.flatnonzero(length < 1e-6)
         corner = self.vertices[self.atlas.faces[buffer.face.reshape(-1)[texels[lost]]]]
-        normal[lost] = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        normal[lost] = triangle_cross(corner)
         length[lost] = np.maximum(np.linalg.norm(normal[lost], axis=1), 1e-30)
         return normal / length[:, None]
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.triangles import triangle_cross
 from ...runtime.mesh import Frame
 from .rays import BATCH, RayScene, RaySettings, cosine_directions, in_batches, pattern_of, sphere_patterns
 
@@ -109,7 +110,7 @@ def starting_points(
     corner = frame.apply(surface.vertices).astype(np.float32)[surface.faces[face]]
     weights = gbuffer.weights(texels)
     point = np.einsum("tc,tci->ti", weights, corner)
-    facing = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).astype(np.float32)
+    facing = triangle_cross(corner).astype(np.float32)
     facing = _unit_or(facing, np.zeros_like(facing))
     normal = _unit_or(gbuffer.normal.reshape(-1, 3)[texels], facing)
     side = np.where(np.einsum("ti,ti->t", facing, normal) < 0.0, -OFFSET, OFFSET).astype(np.float32)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from ...runtime.geometry.triangles import cross_2d
 from ..color import byte_to_linear
 
 if TYPE_CHECKING:
@@ -195,7 +196,7 @@ def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: i
     """
     new = (new_uv[:, 1:] - new_uv[:, :1]) * np.array([size, -size], np.float64)
     old = old_uv[:, 1:] - old_uv[:, :1]
-    area = new[:, 0, 0] * new[:, 1, 1] - new[:, 0, 1] * new[:, 1, 0]
+    area = cross_2d(new[:, 0], new[:, 1])
     inverse = np.stack([new[:, 1, 1], -new[:, 0, 1], -new[:, 1, 0], new[:, 0, 0]], axis=1).reshape(-1, 2, 2)
     usable = np.abs(area) > 1e-12
     return np.where(usable[:, None, None], inverse / np.where(usable, area, 1.0)[:, None, None], 0.0) @ old

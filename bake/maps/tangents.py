@@ -16,6 +16,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ...runtime.geometry.rows import equal_rows
+from ...runtime.geometry.triangles import cross_2d
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -123,7 +126,7 @@ def face_tangents(
     """
     first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     uv_first, uv_second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    sign = np.sign(uv_first[:, 0] * uv_second[:, 1] - uv_first[:, 1] * uv_second[:, 0])
+    sign = np.sign(cross_2d(uv_first, uv_second))
     repeated = (corner == np.roll(corner, 1, axis=1)).all(axis=2).any(axis=1)
     sign[repeated] = 0.0
     direction = (first * uv_second[:, 1:] - second * uv_first[:, 1:]) * sign[:, None]
@@ -172,12 +175,6 @@ def _rank(key: NDArray[np.int64]) -> NDArray[np.int64]:
 def _next_corner(corner: NDArray[np.int64]) -> NDArray[np.int64]:
     """The flat number of the corner that follows in its face."""
     return corner - corner % 3 + (corner + 1) % 3
-
-
-def equal_rows(rows: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) int64: one number for equal rows."""
-    flat = np.ascontiguousarray(rows + 0.0).view(np.dtype((np.void, rows.shape[1] * rows.itemsize)))  # −0 becomes 0
-    return np.unique(flat.reshape(-1), return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 
 def corner_angles(triangles: NDArray[np.float64], axis: NDArray[np.float64], corner: int) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import ShapeError
+from ...runtime.geometry.triangles import signed_areas, triangle_areas
 from ..color import chart_colors, linear_from_oklab, linear_from_srgb
 from ..files.images import Texture, write_png
 from ..raster.context import open_context
@@ -160,7 +161,4 @@ def write_text(picture: NDArray[np.float32], text: str, middle: int, top: int) -
 
 def _areas(atlas: Atlas) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Area of each face on the surface and in uv, (f,) float64 each, not negative."""
-    corner, uv = atlas.positions[atlas.faces], atlas.corner_uv
-    surface = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2.0
-    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return surface, np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2.0
+    return triangle_areas(atlas.positions[atlas.faces]), np.abs(signed_areas(atlas.corner_uv))

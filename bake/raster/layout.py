@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.triangles import signed_areas
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -156,9 +157,7 @@ def border_edges(faces: NDArray[np.int64], uv: NDArray[np.floating]) -> NDArray[
     uv.
     So the edges of faces of zero uv area, of folds and of non-manifold fans are borders too.  Rows ascend.
     """
-    corner = uv[faces].astype(np.float64)
-    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    sign = np.sign(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).astype(np.int64)
+    sign = np.sign(signed_areas(uv[faces].astype(np.float64))).astype(np.int64)
     start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     key = np.minimum(start, end) * (int(faces.max(initial=0)) + 1) + np.maximum(start, end)
     _, edge, count = np.unique(key, return_inverse=True, return_counts=True)

@@ -7,11 +7,12 @@ cross products are exact in 64 bits.  So the faces are equal to the device's, va
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.triangles import cross_2d
 from .gbuffer import LEAST, REACH, WINDOW, GBuffer
 from .layout import Layout, Planes, Window, windows
 
@@ -86,7 +87,7 @@ class SoftwareRasterizer:
         owner, row = np.repeat(faces, count), _ranges(first_row, count)
         first, last = np.zeros(len(owner), np.int64), np.full(len(owner), window.width, np.int64)
         a, b, c = self._snapped[owner].transpose(1, 0, 2)
-        turn = np.sign(_cross(b - a, c - a))
+        turn = np.sign(cross_2d(b - a, c - a))
         centre_y, centre_x = ONE * (row + window.row) + ONE // 2, ONE * window.column + ONE // 2
         for start, end in ((a, b), (b, c), (c, a)):
             along = (end - start) * turn[:, None]
@@ -129,8 +130,8 @@ class SoftwareRasterizer:
         """(t, 3) barycentric weights of the centres, clamped into the face, each at least `LEAST`."""
         centre = _centres(texels, window) / ONE
         a, b, c = (self.layout.texel[faces, i].astype(np.float64) - centre for i in range(3))
-        raw = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
-        weight = np.maximum(raw * np.sign(_cross(b - a, c - a))[:, None], 0.0)
+        raw = np.stack([cross_2d(b, c), cross_2d(c, a), cross_2d(a, b)], axis=1)
+        weight = np.maximum(raw * np.sign(cross_2d(b - a, c - a))[:, None], 0.0)
         total = weight.sum(axis=1, keepdims=True)
         weight = np.maximum(np.where(total > 0.0, weight / np.where(total > 0.0, total, 1.0), 1.0 / 3.0), LEAST)
         return weight / weight.sum(axis=1, keepdims=True)
@@ -201,7 +202,7 @@ def _square_distance(
     along = end - start
     before = (along * (centre - start)).sum(axis=1) <= 0
     after = (along * (centre - end)).sum(axis=1) >= 0
-    height = _cross(along, centre - start).astype(np.float32)
+    height = cross_2d(along, centre - start).astype(np.float32)
     length = _square(along)
     across = height * height / np.where(length > 0.0, length, np.float32(1.0))
     return np.where(before, _square(centre - start), np.where(after, _square(centre - end), across))
@@ -217,11 +218,6 @@ def _centres(texels: NDArray[np.int64], window: Window) -> NDArray[np.int64]:
     """(t, 2) snapped centres (x, y) in the image."""
     row, column = np.divmod(texels, window.width)
     return ONE * np.stack([column + window.column, row + window.row], axis=1) + ONE // 2
-
-
-def _cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """(t,) z of the cross products of rows (t, 2)."""
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _ranges(first: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:

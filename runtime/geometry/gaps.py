@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import Delaunay
 
+from .triangles import cross_2d
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -94,7 +96,7 @@ def closest_points(
 def _sides(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) negative where the ends of second lie on different sides of the line of first."""
     along, offset = first[:, None, 1] - first[:, None, 0], second - first[:, None, 0]
-    return np.prod(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0], axis=1)
+    return np.prod(cross_2d(along, offset), axis=1)
 
 
 def _foot(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,10 +17,11 @@ import numpy as np
 
 from ..errors import InputError, ShapeError
 from ..mesh import Frame, Surface
-from .distortion import corner_angles, edge_lengths, singular_values, symmetric_dirichlet
+from .distortion import TRIM, singular_values, symmetric_dirichlet
 from .gaps import smallest_chart_gap
-from .overlap import orientation_sign, overlap_area, overlapping_pairs, signed_areas
+from .overlap import orientation_sign, overlap_area, overlapping_pairs
 from .topology import EdgeTable, edge_table, face_components
+from .triangles import corner_angles, edge_lengths, jacobians, signed_areas
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,7 +139,9 @@ def face_distortion(surface: Surface, corner_uv: NDArray[np.float64]) -> NDArray
     _check(surface, corner_uv, None)
     triangles, scaled_uv, area = _normalized(surface, corner_uv)
     energy = np.ones(len(area))
-    energy[area > _NO_AREA] = symmetric_dirichlet(*singular_values(triangles, scaled_uv)[:, area > _NO_AREA])
+    solid = area > _NO_AREA
+    sigma = singular_values(jacobians(triangles[solid], scaled_uv[solid]))
+    energy[solid] = np.minimum(symmetric_dirichlet(*sigma), TRIM)
     return energy
 
 
@@ -217,13 +220,13 @@ def _distortion_means(
 ) -> dict[str, Any]:
     solid = area > _NO_AREA
     triangles, uv, area = triangles[solid], uv[solid], area[solid]
-    large, small = np.maximum(singular_values(triangles, uv), 1e-12)
+    large, small = np.maximum(singular_values(jacobians(triangles, uv)), 1e-12)
     weight = area / area.sum()
     return {
         "conformal_mean": float(np.abs(corner_angles(triangles) - corner_angles(uv)).mean()),
         "isometric_mean": float(np.abs(edge_lengths(triangles) - edge_lengths(uv)).mean()),
         "equiareal_mean": float(np.abs(area - np.abs(signed_areas(uv))).mean()),
-        "symmetric_dirichlet_mean": float((weight * symmetric_dirichlet(large, small)).sum()),
+        "symmetric_dirichlet_mean": float((weight * np.minimum(symmetric_dirichlet(large, small), TRIM)).sum()),
         "stretch_l2": math.sqrt(float((weight * (large**-2 + small**-2)).sum()) / 2.0),
         "stretch_linf": float((1.0 / small).max()),
     }

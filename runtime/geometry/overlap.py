@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .triangles import cross_2d, signed_areas
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -76,12 +78,6 @@ def overlap_fraction(uv: NDArray[np.float64]) -> float:
     """
     pairs = overlapping_pairs(uv)
     return overlap_area(uv, pairs) / float(np.abs(signed_areas(uv)).sum()) if len(pairs) else 0.0
-
-
-def signed_areas(uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(f,) float64 signed areas of uv (f, 3, 2), rounded; positive = counter-clockwise."""
-    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
 def _determinant(
@@ -212,15 +208,13 @@ def _intersection_areas(first: NDArray[np.float64], second: NDArray[np.float64])
     for i in range(3):
         polygon = _clip(polygon, second[:, i], second[:, (i + 1) % 3])
     following = np.roll(polygon, -1, axis=1)
-    cross = polygon[..., 0] * following[..., 1] - polygon[..., 1] * following[..., 0]
-    return np.maximum(0.5 * cross.sum(axis=1), 0.0)
+    return np.maximum(0.5 * cross_2d(polygon, following).sum(axis=1), 0.0)
 
 
 def _clip(polygon: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """The part (p, 2m, 2) of convex polygons (p, m, 2) to the left of the lines a → b (p, 2); zeros where none is."""
     along = b - a
-    offset = polygon - a[:, None]
-    height = along[:, None, 0] * offset[..., 1] - along[:, None, 1] * offset[..., 0]
+    height = cross_2d(along[:, None], polygon - a[:, None])
     following, next_height = np.roll(polygon, -1, axis=1), np.roll(height, -1, axis=1)
     crosses = (height > 0.0) != (next_height > 0.0)
     share = np.divide(height, height - next_height, out=np.zeros_like(height), where=crosses)

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import KDTree
 
 from ..errors import MeshError
+from ..geometry.rows import by_first_appearance, equal_rows, first_of_each
 from ..mesh import Asset, Surface
 from .rawmesh import LARGEST_DIAGONAL, RawMesh, check
 
@@ -219,25 +220,3 @@ def _edge_counts(faces: NDArray[np.int64]) -> dict[str, int]:
     edges = _face_edges(faces)
     components = int(connected_labels(edges.links, len(faces)).max()) + 1
     return {"non_manifold_edges": edges.non_manifold, "components": components if components > 1 else 0}
-
-
-def equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n,) int64 label of each row of (n, 3), equal exactly for equal rows (-0.0 is 0.0)."""
-    order = np.lexsort(rows.T)
-    new = (np.diff(rows[order], axis=0) != 0).any(axis=1)
-    label = np.zeros(len(rows), dtype=np.int64)
-    label[order] = np.concatenate([[0], np.cumsum(new)])
-    return label
-
-
-def first_of_each(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(k,) int64 index of the first element with each label 0 … k − 1."""
-    return np.unique(label, return_index=True)[1].astype(np.int64)
-
-
-def by_first_appearance(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The same classes, numbered in the order in which they first appear."""
-    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse]

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, ShapeError
-from .cleaning import SMALLEST_DIAGONAL, first_of_each, weld_vertices
+from ..geometry.rows import first_of_each
+from .cleaning import SMALLEST_DIAGONAL, weld_vertices
 from .rawmesh import LARGEST_DIAGONAL, as_rgba, unit_vectors
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, ShapeError
-from .cleaning import by_first_appearance, equal_rows, first_of_each
+from ..geometry.rows import by_first_appearance, equal_rows, first_of_each
 
 if TYPE_CHECKING:
     from pathlib import Path

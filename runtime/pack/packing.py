@@ -20,8 +20,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import FinishError, InputError
 from ..geometry.metrics import uv_charts
-from ..geometry.overlap import signed_areas
 from ..geometry.topology import edge_table
+from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
 from .growth import apply_placement, grown
 from .placement import Relief, place, relief, solid, turned

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import FinishError
-from ..geometry.distortion import corner_angles
+from ..geometry.normals import smooth_normals
 from ..geometry.overlap import orientation_sign
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import Asset, Surface
+    from ..mesh import Asset
 
 _REPAIR_ROUNDS = 8
 _STEPS = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)), axis=-1).reshape(-1, 2)
@@ -55,16 +55,6 @@ def atlas_normals(asset: Asset, source_vertex: NDArray[np.int64]) -> NDArray[np.
     smooth = smooth_normals(asset.surface)[asset.weld[source_vertex]]
     with np.errstate(invalid="ignore"):
         return np.where(length > 0.0, normals / length, smooth).astype(np.float32)
-
-
-def smooth_normals(surface: Surface) -> NDArray[np.float64]:
-    """(v, 3) float64 unit vertex normals: face normals weighted by the angle at the vertex; +z where they cancel."""
-    weighted = surface.face_normals()[:, None, :] * corner_angles(surface.triangles)[:, :, None]
-    total = np.zeros_like(surface.vertices)
-    np.add.at(total, surface.faces.reshape(-1), weighted.reshape(-1, 3))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    up = np.array([0.0, 0.0, 1.0])
-    return np.where(length > 1e-12, total / np.maximum(length, 1e-12), up)
 
 
 def rounded_uv(uv: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]:

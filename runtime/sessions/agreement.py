@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..geometry.overlap import signed_areas
 from ..geometry.topology import edge_table
+from ..geometry.triangles import signed_areas, triangle_areas
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,7 +88,7 @@ def across_a_seam(
     if len(points) == 0:
         return np.zeros(0, dtype=bool)
     corner, flat = atlas.positions[atlas.faces], atlas.corner_uv
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2.0
+    area = triangle_areas(corner).sum()
     texel = float(np.sqrt(area / np.abs(signed_areas(flat)).sum())) / TEXELS
     table = edge_table(atlas.faces)
     rim = table.edges[table.boundary]
@@ -110,7 +110,7 @@ def surface_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Points uniform by area: xyz (n, 3) source units, their atlas uv (n, 2), their chart (n,)."""
     corner = atlas.positions[atlas.faces]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    area = triangle_areas(corner)
     face = rng.choice(len(area), size=count, p=area / area.sum())
     weight = rng.dirichlet(np.ones(3), size=count)
     xyz = np.einsum("nc,ncx->nx", weight, corner[face])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..geometry.distortion import corner_angles
+from ..geometry.triangles import corner_angles
 from ..mesh import Frame
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Sampling: one triangle, counts by area, uniformity inside a face, frames at the poles; solids and a real mesh."""
+"""Sampling: one triangle, counts by area, uniformity inside a face; solids and a real mesh."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ import trimesh
 
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.sampling import sample_surface, samples_in_faces, tangent_frames
+from flexpara.train.sampling import sample_surface, samples_in_faces
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
 
 TRIANGLE = Surface(np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 2.0, 1.0]]), np.array([[0, 1, 2]]))
 
@@ -108,36 +107,6 @@ def test_samples_in_faces_lie_in_the_faces_named() -> None:
     np.testing.assert_array_equal(samples.normal, surface.face_normals()[face])
     offset = samples.xyz - surface.triangles[face, 0]
     np.testing.assert_allclose(np.einsum("nc,nc->n", offset, samples.normal), 0.0, atol=1e-14)
-
-
-def directions() -> NDArray[np.float64]:
-    """Unit vectors: random ones, both poles with zeros of both signs, the axes, and some close to the poles."""
-    poles = [
-        [0.0, 0.0, 1.0],
-        [0.0, 0.0, -1.0],
-        [-0.0, -0.0, 1.0],
-        [-0.0, 0.0, -1.0],
-        [1.0, 0.0, 0.0],
-        [0.0, -1.0, -0.0],
-    ]
-    close = [[1e-9, -1e-9, z] for z in (1.0, -1.0)] + [[1e-4, 0.0, -1.0], [0.0, 1e-4, 1.0]]
-    every = np.concatenate([poles, close, rng(1).normal(size=(500, 3))])
-    return every / np.linalg.norm(every, axis=1, keepdims=True)
-
-
-def test_tangent_frames_are_orthonormal_and_right_handed() -> None:
-    normal = directions()
-    first, second = tangent_frames(normal)
-    frame = np.stack([first, second, normal], axis=1)
-    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (len(normal), 1, 1)), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.det(frame), 1.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("z", [1.0, -1.0])
-def test_the_tangents_at_a_pole_are_the_axes(z: float) -> None:
-    first, second = tangent_frames(np.array([[0.0, 0.0, z]]))
-    np.testing.assert_allclose(first, [[1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(second, [[0.0, z, 0.0]])
 
 
 def test_a_real_mesh_is_sampled_by_area(models: Path) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.geometry.topology import boundary_loops
+from ...runtime.geometry.triangles import triangle_normals
 from .stars import circumradius
 
 if TYPE_CHECKING:
@@ -108,8 +109,7 @@ def _price(
 ) -> NDArray[np.float64]:
     """(h, b) circumradius of triangles (h, b, 3), infinite where one faces away from the normal of a corner."""
     triangles = points[corners]
-    cross = np.cross(triangles[:, :, 1] - triangles[:, :, 0], triangles[:, :, 2] - triangles[:, :, 0])
-    unit = cross / np.maximum(np.linalg.norm(cross, axis=2), np.finfo(np.float64).tiny)[:, :, None]
+    unit = triangle_normals(triangles)
     mean = np.einsum("hbc,hbic->hb", unit, normals[corners]) / 3.0
     radius = circumradius(triangles.reshape(-1, 3, 3)).reshape(corners.shape[:2])
     return np.where(mean > -0.5, radius * (2.0 - mean), np.inf)

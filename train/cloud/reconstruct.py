@@ -15,8 +15,8 @@ import igl
 import numpy as np
 
 from ...runtime.errors import MeshError
-from ...runtime.geometry.distortion import corner_angles
 from ...runtime.geometry.topology import components, split_non_manifold_vertices
+from ...runtime.geometry.triangles import corner_angles
 from ...runtime.io.cloud import CloudMesh, distinct_points, with_changes
 from ...runtime.mesh import Asset, Surface
 from .config import CloudConfig

@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.normals import tangent_frames
+from ...runtime.geometry.triangles import triangle_cross
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -60,7 +63,7 @@ def star_candidates(
         parts.append(np.stack([rows[centre], index[rows[centre], first], index[rows[centre], second]], axis=1))
     seen = np.concatenate(parts)
     corners, votes = _counted(seen)
-    cross = np.cross(points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]])
+    cross = triangle_cross(points[corners])
     area = np.linalg.norm(cross, axis=1)
     unit = cross / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
     facing = np.einsum("tc,tic->ti", unit, normals[corners])
@@ -108,7 +111,7 @@ def rolled_neighbours(
         (b, k, 2) float64.
     """
     normal = normals[rows]
-    across, along = tangent_frame(normal)
+    across, along = tangent_frames(normal)
     way = points[index] - points[rows, None]
     flat = np.stack([np.einsum("bkc,bc->bk", way, axis) for axis in (across, along)], axis=2)
     distance, width = np.linalg.norm(way, axis=2), np.linalg.norm(flat, axis=2)
@@ -116,16 +119,6 @@ def rolled_neighbours(
     belongs = same_side & (width > config.steep * distance) & (distance > 0.0)
     stretch = np.where(belongs, distance / np.where(belongs, width, 1.0), np.nan)
     return flat * stretch[:, :, None]
-
-
-def tangent_frame(normals: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two unit vectors (n, 3) that make a right-handed frame with unit normals (n, 3) (Duff et al. 2017)."""
-    x, y, z = normals.T
-    sign = np.where(z < 0.0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    return first, np.stack([b, sign + y * y * a, -y], axis=1)
 
 
 def star_pairs(

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from ...runtime.geometry.topology import edge_table
+from ...runtime.geometry.triangles import signed_areas
 from ..learn.networks import AtlasNetworks
 from ..learn.optimizer import OneCycleAdam
 from ..sampling import sample_surface
@@ -137,8 +138,7 @@ def sample_thin(
 
 def uv_area(charts: Charts) -> float:
     """Total area of all uv triangles."""
-    first, second = charts.corner_uv[:, 1] - charts.corner_uv[:, 0], charts.corner_uv[:, 2] - charts.corner_uv[:, 0]
-    return float(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
+    return float(np.abs(signed_areas(charts.corner_uv)).sum())
 
 
 def seam_halfedges(surface: Surface, charts: Charts) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
 from ...runtime.sessions.wrapagreement import corner_normals, interpolated_normals
 from ..config import WrapConfig
@@ -116,7 +117,7 @@ class SheetSamples(NamedTuple):
 
 def sample_sheets(surface: Surface, charts: Charts, per_patch: int, rng: np.random.Generator) -> SheetSamples:
     """``per_patch`` points of each patch, stratified by area; area in chart coordinates."""
-    normals, flat_area = corner_normals(surface), uv_face_areas(charts)
+    normals, flat_area = corner_normals(surface), np.abs(signed_areas(charts.corner_uv))
     faces, barycentric, area = [], [], []
     for patch in range(len(charts.patch_chart)):
         ids = np.flatnonzero(charts.face_patch == patch)
@@ -135,12 +136,6 @@ def sample_sheets(surface: Surface, charts: Charts, per_patch: int, rng: np.rand
         chart=charts.face_chart[face],
         area=np.concatenate(area),
     )
-
-
-def uv_face_areas(charts: Charts) -> NDArray[np.float64]:
-    """(f,) float64, chart units squared."""
-    first, second = charts.corner_uv[:, 1] - charts.corner_uv[:, 0], charts.corner_uv[:, 2] - charts.corner_uv[:, 0]
-    return 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
 @torch.no_grad()

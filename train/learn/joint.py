@@ -11,7 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..sampling import Samples, tangent_frames
+from ...runtime.geometry.normals import tangent_frames
+from ..sampling import Samples
 from .losses import arap_energy, cosine_gap, position_gap, weighted_mean
 from .networks import Cycle, MultiChartNetworks
 from .optimizer import OneCycleAdam

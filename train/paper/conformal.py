@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.geometry.distortion import corner_angles
-from ...runtime.geometry.overlap import flipped_triangles, signed_areas
+from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.triangles import corner_angles, signed_areas
 from ..finish.contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
 from ..finish.flatten import CONFORMAL, Slim, slim
 

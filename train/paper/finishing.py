@@ -19,8 +19,9 @@ import igl
 import numpy as np
 
 from ...runtime.errors import ShapeError
-from ...runtime.geometry.overlap import flipped_triangles, signed_areas
+from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import boundary_loops, edge_table, split_non_manifold_vertices
+from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
 from ..config import FinishConfig
 from ..finish.contact import Relaxed, excess_energy, relax

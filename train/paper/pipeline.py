@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from ...runtime.geometry.distortion import corner_angles, edge_lengths
 from ...runtime.geometry.metrics import measure
-from ...runtime.geometry.overlap import signed_areas
+from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_areas, triangle_areas
 from ...runtime.mesh import Charts, Frame, Surface
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
@@ -173,8 +172,7 @@ def distortions(triangles: NDArray[np.float64], uv: NDArray[np.float64]) -> dict
     conformal_mean: |angle − uv angle|, radians.  equiareal_mean: |area − uv area|.  isometric_mean: |length − uv
     length|, both in unit-ball units.  flipped: share of faces against the majority's orientation.
     """
-    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2.0
-    signed = signed_areas(uv)
+    area, signed = triangle_areas(triangles), signed_areas(uv)
     names = ("conformal_mean", "equiareal_mean", "isometric_mean", "flipped")
     if not np.abs(signed).sum() > 0.0:
         return {"faces": len(triangles), **dict.fromkeys(names)}

@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 
 from ...runtime.errors import ShapeError
 from ...runtime.geometry.topology import EdgeTable, edge_table
+from ...runtime.geometry.triangles import signed_areas
 from ..finish.disks import ShortestPaths, disk_cuts, edge_costs, path_mask, prune, shortest_paths, trace_back
 from ..sampling import sample_surface
 
@@ -114,10 +115,8 @@ def usual_stretch(
     piece: Surface, uv: NDArray[np.float64], places: NDArray[np.float64], config: SeamConfig
 ) -> NDArray[np.float64]:
     """(m,) √(uv area / area) around places (m, 3): the lower quartile, as bands have too much; never near 0."""
-    corner = uv[piece.faces]
-    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    doubled = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
-    scale = np.sqrt(0.5 * doubled / np.maximum(piece.face_areas(), 1e-300))
+    flat = np.abs(signed_areas(uv[piece.faces]))
+    scale = np.sqrt(flat / np.maximum(piece.face_areas(), 1e-300))
     samples = sample_surface(piece, config.samples, np.random.default_rng(0))  # fixed: seams follow from the map alone
     value = scale[samples.face]
     local = np.quantile(value[KDTree(samples.xyz).query(samples.xyz, k=config.nearby)[1]], 0.25, axis=1)

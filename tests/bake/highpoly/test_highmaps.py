@@ -15,11 +15,11 @@ from flexpara.bake.maps.maps import all_maps, find_map
 from flexpara.bake.maps.rays import RayScene, RaySettings
 from flexpara.bake.maps.tangents import vertex_tangents
 from flexpara.runtime.errors import InputError
+from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.material import Material
 from flexpara.runtime.mesh import Asset, Atlas, Frame, Surface
 from flexpara.runtime.pack.packing import atlas_from_uv
-from flexpara.runtime.pack.seams import smooth_normals
 from flexpara.runtime.samples import make_sample
 
 Pair = tuple[Atlas, Asset]

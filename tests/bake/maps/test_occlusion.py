@@ -15,9 +15,9 @@ import pytest
 from flexpara.bake.maps.occlusion import OFFSET, ambient_occlusion, bent_normals, lift, starting_points, thickness
 from flexpara.bake.maps.rays import RaySettings
 from flexpara.bake.raster.gbuffer import GBuffer
+from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.mesh import Asset, Atlas, Frame, Surface
-from flexpara.runtime.pack.seams import smooth_normals
 from flexpara.runtime.samples import make_sample
 
 Scene = tuple[Atlas, Asset]

@@ -1,4 +1,4 @@
-"""Atlas vertices: by-hand splits, normals of known solids, slivers that float32 would flip."""
+"""Atlas vertices: by-hand splits, normals kept and filled, slivers that float32 would flip."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import trimesh
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.geometry.overlap import flipped_triangles
 from flexpara.runtime.mesh import Asset, Surface
-from flexpara.runtime.pack.seams import atlas_normals, rounded_uv, smooth_normals, split_vertices
+from flexpara.runtime.pack.seams import atlas_normals, rounded_uv, split_vertices
 
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
 QUAD = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -33,16 +33,6 @@ def test_a_seam_in_uv_or_a_change_of_chart_doubles_its_vertices() -> None:
         assert source.tolist() == [0, 0, 1, 2, 2, 3]
         assert np.array_equal(source[faces], TWO)
         assert np.array_equal(uv[faces], corner_uv)
-
-
-def test_normals_of_a_sphere_point_outwards() -> None:
-    surface = surface_of(trimesh.creation.icosphere(subdivisions=3))
-    assert (smooth_normals(surface) * surface.vertices).sum(axis=1).min() > 0.999
-
-
-def test_normals_of_a_cube_corner_do_not_depend_on_its_diagonals() -> None:
-    surface = surface_of(trimesh.creation.box())
-    assert smooth_normals(surface) == pytest.approx(surface.vertices / np.sqrt(0.75))
 
 
 def test_normals_of_the_file_are_kept_and_missing_ones_filled() -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.geometry.topology import boundary_loops, euler_characteristic, is_manifold
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.pack.seams import smooth_normals
 from flexpara.runtime.samples import make_sample
 from flexpara.train.cloud.config import CloudConfig
 from flexpara.train.cloud.holes import hole_triangles, simple_loops

@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 from flexpara.train.cloud.config import CloudConfig
 from flexpara.train.cloud.normals import local_spacing, nearest_neighbours
-from flexpara.train.cloud.stars import circumradius, rolled_neighbours, star_candidates, star_pairs, tangent_frame
+from flexpara.train.cloud.stars import circumradius, rolled_neighbours, star_candidates, star_pairs
 
 CONFIG = CloudConfig()
 
@@ -16,15 +16,6 @@ CONFIG = CloudConfig()
 def test_the_circumradius_of_a_right_triangle_is_half_its_hypotenuse() -> None:
     triangles = np.array([[[0.0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 0, 0], [1, 0, 0], [2, 0, 0]]])
     np.testing.assert_allclose(circumradius(triangles), [2.5, np.inf])
-
-
-def test_the_tangent_frame_is_orthonormal_and_right_handed_at_the_poles_too() -> None:
-    normals = np.concatenate([np.random.default_rng(0).normal(size=(50, 3)), [[0, 0, 1], [0, 0, -1], [0, 1, 0]]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    first, second = tangent_frame(normals)
-    frames = np.stack([first, second, normals], axis=1)
-    np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), np.tile(np.eye(3), (53, 1, 1)), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.det(frames), 1.0)
 
 
 def test_the_star_of_four_neighbours_in_a_cross_is_four_triangles() -> None:

@@ -9,8 +9,9 @@ import pytest
 
 pytest.importorskip("igl")
 
-from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs, signed_areas
+from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, euler_characteristic
+from flexpara.runtime.geometry.triangles import signed_areas
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
