@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 from .runtime.errors import FlexparaError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy as np
     from numpy.typing import NDArray
 
@@ -58,38 +56,16 @@ def __getattr__(name: str) -> object:
 
 
 def unwrap(
-    mesh: MeshLike | PointCloud,
-    *,
-    charts: int = 8,
-    size: int = 2048,
-    padding: int | None = None,
-    seed: int = 0,
-    preset: str = "fast",
-    mode: str = "multi-chart",
-    steps: int | None = None,
-    width: int | None = None,
-    points: int | None = None,
-    precision: str = "float32",
-    ablation: Sequence[str] = (),
-    progress: Progress | None = None,
+    mesh: MeshLike | PointCloud, options: Options | None = None, *, progress: Progress | None = None, **keywords: Any
 ) -> UnwrapResult:
     """Unwrap a mesh, or a point cloud.
 
     Args:
         mesh: a path, a trimesh.Trimesh, (vertices (n, 3), faces (f, 3)), or a runtime.cloud.PointCloud.  A file
             without faces (.ply, .xyz, .npy, …) is a point cloud.
-        charts: the most charts a connected surface may get.
-        size: atlas side, texels.
-        padding: texels kept free around each chart; None is size / 256, at least 2.
-        seed: same seed, same machine, same atlas and network.
-        preset: "fast" is seconds on a CPU; "paper" trains as published (Zhao et al. 2025), best on a GPU.
-        mode: of preset paper: "multi-chart" or "global", one chart.
-        steps: of preset paper; None as published (10,000).
-        width: channels of its hidden layers; None as published (512).
-        points: of the surface, in each of its steps; None is 4900.  Fewer are faster.
-        precision: of its products: "float32" or "bfloat16".
-        ablation: parts of its losses left out or added, see runtime.options.ABLATIONS.
+        options: what decides the result, see `flexpara.Options`; None: its defaults.
         progress: called as progress(stage, step, steps, loss); loss is None outside training.
+        **keywords: fields of `flexpara.Options`, in place of those of options: charts=8, size=2048, seed=0, …
 
     Raises:
         InputError: the mesh or an option is wrong.
@@ -97,9 +73,9 @@ def unwrap(
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
     from .runtime.io.cloud import PointCloud
-    from .runtime.options import Options
+    from .runtime.options import Options, from_keywords
 
-    options = Options(charts, size, padding, seed, preset, mode, steps, width, points, precision, tuple(ablation))
+    options = from_keywords(Options, options, keywords)
     source = load_any(mesh)
     if isinstance(source, PointCloud):
         return unwrap_cloud(source, options, progress)
@@ -214,30 +190,30 @@ class UnwrapResult:
     def save(
         self,
         folder: str | Path,
+        outputs: Outputs | None = None,
         *,
-        maps: Sequence[str] = ("auto",),
-        formats: Sequence[str] = ("glb",),
-        preview: bool = True,
-        inverse: bool = False,
-        target: str | None = None,
-        samples: int = 1,
-        rays: int = 64,
         force: bool = False,
         progress: Progress | None = None,
+        **keywords: Any,
     ) -> tuple[Path, ...]:
-        """Write mesh, ONNX file, textures, preview and report, all or none; returns their paths.  See Outputs.
+        """Write mesh, ONNX file, textures, preview and report, all or none; returns their paths.
+
+        Args:
+            folder: made where it is absent.
+            outputs: what is written, see `flexpara.Outputs`; None: its defaults.
+            force: whether files are overwritten that flexpara did not write.
+            progress: as for `unwrap`.
+            **keywords: fields of `flexpara.Outputs`, in place of those of outputs: maps=("normal",), preview=False, …
 
         Raises:
-            InputError: an unknown map, format or target.
+            InputError: an unknown map, format, target or keyword.
             ForeignFileError: a file is in the way that flexpara did not write, and force is off.
             MissingDependencyError: the packages of flexpara[bake] are absent.
         """
         from .runtime.files import OutputFolder
-        from .runtime.options import Outputs
+        from .runtime.options import Outputs, from_keywords
 
-        outputs = Outputs(
-            tuple(maps), tuple(formats), preview, inverse=inverse, target=target, samples=samples, rays=rays
-        )
+        outputs = from_keywords(Outputs, outputs, keywords)
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
             return self.write(output, outputs, progress)
 

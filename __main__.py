@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
-from cyclopts import App
+from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
 from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cloud
 from .bake.commands import bake
 from .bake.output import check_outputs, chosen_maps, padding_of
 from .runtime.commands import evaluate, query, sample
-from .runtime.console import Flag, Output, complain, names, show
+from .runtime.console import Console, Manners, complain
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
-from .runtime.options import Options, Outputs
+from .runtime.options import AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
 from .runtime.progress import Clock, progress_bars
 from .runtime.runfile import Run
 
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 TRAINED = "trained.safetensors"
+CHARTS = Parameter(name="*", group="Charts and atlas")
+FILES = Parameter(name="*", group="Maps and files")
+"""Options of a class, under a heading in the help."""
 app = App(
     name="flexpara",
     help="UV atlases with few charts and little distortion, an ONNX file that knows them, and baked textures.",
@@ -67,100 +71,56 @@ def unwrap(
     mesh: Path | None = None,
     *,
     output: Output | None = None,
-    charts: int = 8,
-    size: int = 2048,
-    padding: int | None = None,
-    maps: str = "auto",
-    format: str = "glb",
-    texture_format: Literal["png", "exr"] | None = None,
-    normal_format: Literal["opengl", "directx"] = "opengl",
-    target: str | None = None,
-    samples: int = 1,
-    rays: int = 64,
-    inverse: Flag = False,
-    preview: bool | None = None,
-    seed: int = 0,
-    preset: str = "fast",
-    mode: str = "multi-chart",
-    steps: int | None = None,
-    width: int | None = None,
-    points: int | None = None,
-    precision: str = "float32",
-    ablation: str = "none",
-    checkpoint_every: int | None = None,
-    resume: Path | None = None,
-    quiet: Flag = False,
-    force: Flag = False,
+    options: Annotated[Options, CHARTS] = Options(),
+    outputs: Annotated[Outputs, FILES] = Outputs(),
+    checkpoints: Annotated[CheckpointOptions, Parameter(name="*")] = CheckpointOptions(),
+    console: Manners = Console(),
 ) -> int:
     """Unwrap a mesh or a point cloud into an atlas of few charts, an ONNX file and textures.
 
     Args:
-        mesh: any file trimesh reads: obj, ply, stl, glb, gltf, off, …; or points: ply without faces, xyz, csv, npy
-        output: folder for STEM.glb, STEM.onnx, STEM_MAP.png or .exr, STEM.report.json and STEM.preview.png
-        charts: the most charts a connected surface may get
-        size: atlas side, texels
-        padding: texels kept free around each chart (default: size / 256, at least 2)
-        maps: comma-separated, see bake; auto: normal, position, and what the source's materials have, or else a
-            checker; none: uv only
-        format: mesh files, comma-separated: glb, obj, ply, usda
-        texture_format: of all maps that can be stored so (default: each map's own)
-        normal_format: green channel of the normal map: opengl (+Y) or directx (-Y)
-        target: gltf, unreal, unity, godot, blender or usd: file names, packing, depth, green channel and padding
-        samples: of each texel: 1, 4 or 16
-        rays: of ray-traced maps, per sample
-        inverse: also write STEM.wrap.onnx: uv and chart to point and normal
-        preview: draw STEM.preview.png (default: where maps are drawn)
-        seed: same seed, same machine, same bytes
-        preset: fast: seconds on a CPU; paper: trained as published, best on a GPU
-        mode: of preset paper: multi-chart or global (one chart)
-        steps: of preset paper (default: 10000)
-        width: channels of its hidden layers (default: 512)
-        points: of the surface, in each of its steps (default: 4900); fewer is faster
-        precision: of its products: float32 or bfloat16
-        ablation: its parts left out or added, comma-separated: no-triangle, no-differential, no-upper, no-lower;
-            bidirectional, chart-differential
-        checkpoint_every: steps of preset paper between checkpoints
-        resume: output folder of a run with checkpoints that was cut short; takes no other options
-        quiet: no progress, no summary
-        force: overwrite files that flexpara did not write
+        mesh: A mesh (obj, ply, stl, glb, gltf, off, or what else trimesh reads), or points (ply without faces, xyz,
+            csv, npy).
+        output: The folder for STEM.glb, STEM.onnx, STEM_MAP.png or .exr, STEM.report.json and STEM.preview.png.
+        options: See Options.
+        outputs: See Outputs.
+        checkpoints: See CheckpointOptions.
+        console: See Console.
     """
-    if resume is not None:
+    if checkpoints.resume is not None:
+        asked = mesh, output, options, outputs, checkpoints.every
+        if asked != (None, None, Options(), Outputs(), None):
+            raise InputError("resume beside other options, expected none, as the run keeps its own; leave them out")
         from .runtime.runfile import find_run
 
-        return _perform(find_run(resume), quiet=quiet, force=force)
+        return _perform(find_run(checkpoints.resume), console)
     if mesh is None or output is None:
         missing = "--mesh" if mesh is None else "--output"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
-    margin = padding_of(padding, target, size)
-    options = Options(charts, size, margin, seed, preset, mode, steps, width, points, precision, names(ablation))
-    kinds = texture_format, normal_format
-    drawn = bool(names(maps)) if preview is None else preview
-    outputs = Outputs(names(maps), names(format), drawn, *kinds, inverse, target, samples=samples, rays=rays)
-    run = Run(mesh.absolute(), output, options, outputs, checkpoint_every)
-    return _perform(run, quiet=quiet, force=force)
+    options = replace(options, padding=padding_of(options.padding, outputs.target, options.size))
+    return _perform(Run(mesh.absolute(), output, options, outputs, checkpoints.every), console)
 
 
-def _perform(run: Run, *, quiet: bool, force: bool) -> int:
+def _perform(run: Run, console: Console) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset
 
     chosen_maps(run.outputs)
     source = load_any(run.mesh)
-    with OutputFolder(run.output, source.stem, force=force, source=run.mesh) as folder:
+    with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
         if isinstance(source, Asset):
             outputs = run.outputs.for_asset(source)
             check_outputs(folder, outputs, chosen_maps(outputs))
         run.save()
-        with progress_bars(quiet=quiet) as progress:
+        with progress_bars(quiet=console.quiet) as progress:
             if isinstance(source, Asset):
                 result = unwrap_asset(source, run.options, progress, run.keep)
             else:
                 result = unwrap_cloud(source, run.options, progress, run.keep)
             written = result.write(folder, run.outputs, progress)
     run.forget()
-    if not quiet:
-        show({**result.report["metrics"], **result.report["network"]}, written)
+    console.show({**result.report["metrics"], **result.report["network"]}, written)
     return 0
 
 
@@ -169,64 +129,34 @@ def train(
     mesh: Path,
     *,
     output: Output,
-    charts: int = 8,
-    seed: int = 0,
-    preset: str = "fast",
-    mode: str = "multi-chart",
-    steps: int | None = None,
-    width: int | None = None,
-    points: int | None = None,
-    precision: str = "float32",
-    ablation: str = "none",
-    quiet: Flag = False,
-    force: Flag = False,
+    options: Annotated[TrainOptions, CHARTS] = TrainOptions(),
+    console: Manners = Console(),
 ) -> int:
     """The first half of unwrap: charts and networks, as STEM.trained.safetensors for flexpara export.
 
     Args:
-        mesh: any file trimesh reads
-        output: folder for STEM.trained.safetensors and STEM.train.json
-        charts: the most charts a connected surface may get
-        seed: same seed, same machine, same bytes
-        preset: fast: seconds on a CPU; paper: trained as published, best on a GPU
-        mode: of preset paper: multi-chart or global (one chart)
-        steps: of preset paper (default: 10000)
-        width: channels of its hidden layers (default: 512)
-        points: of the surface, in each of its steps (default: 4900); fewer is faster
-        precision: of its products: float32 or bfloat16
-        ablation: its parts left out or added, see unwrap
-        quiet: no progress, no summary
-        force: overwrite files that flexpara did not write
+        mesh: Any mesh that unwrap takes.
+        output: The folder for STEM.trained.safetensors and STEM.train.json.
+        options: See TrainOptions.
+        console: See Console.
     """
-    options = Options(
-        charts=charts,
-        seed=seed,
-        preset=preset,
-        mode=mode,
-        steps=steps,
-        width=width,
-        points=points,
-        precision=precision,
-        ablation=names(ablation),
-    )
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
-    name = f"{asset.stem}.{TRAINED}"
-    with OutputFolder(output, asset.stem, force=force, source=mesh, report=f"{asset.stem}.train.json") as folder:
+    name, report = f"{asset.stem}.{TRAINED}", f"{asset.stem}.train.json"
+    with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         folder.check([name, folder.report_name])
         with requires("train"):
             from .export.unwrapping import train_asset
             from .train.saved import to_bytes
-        with progress_bars(quiet=quiet) as progress:
+        with progress_bars(quiet=console.quiet) as progress:
             trained = train_asset(asset, options, Clock(progress))
         folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
         source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
         facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}
         folder.write_report(facts)
         written = folder.commit()
-    if not quiet:
-        show({}, written)
+    console.show({}, written)
     return 0
 
 
@@ -236,46 +166,35 @@ def export(
     mesh: Path,
     *,
     output: Output,
-    size: int = 2048,
-    padding: int | None = None,
-    maps: str = "none",
-    format: str = "glb",
-    inverse: Flag = False,
-    preview: bool = True,
-    quiet: Flag = False,
-    force: Flag = False,
+    options: Annotated[AtlasOptions, CHARTS] = AtlasOptions(),
+    outputs: Annotated[Outputs, FILES] = Outputs(),
+    console: Manners = Console(),
 ) -> int:
     """The second half of unwrap: pack what flexpara train found, export the ONNX file, write the mesh, bake.
 
     Args:
-        trained: STEM.trained.safetensors
-        mesh: the mesh it was trained on
-        output: folder for what unwrap writes
-        size: atlas side, texels
-        padding: texels kept free around each chart (default: size / 256, at least 2)
-        maps: comma-separated, see unwrap
-        format: mesh files, comma-separated: glb, obj, ply
-        inverse: also write STEM.wrap.onnx: uv and chart to point and normal
-        preview: draw STEM.preview.png
-        quiet: no progress, no summary
-        force: overwrite files that flexpara did not write
+        trained: STEM.trained.safetensors.
+        mesh: The mesh that it was trained on.
+        output: The folder for what unwrap writes.
+        options: See AtlasOptions.
+        outputs: See Outputs.
+        console: See Console.
     """
-    options = Options(size=size, padding=padding)
-    outputs = Outputs(names(maps), names(format), preview, inverse=inverse)
+    margin = replace(options, padding=padding_of(options.padding, outputs.target, options.size)).margin
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
-    with OutputFolder(output, asset.stem, force=force, source=mesh) as folder:
-        check_outputs(folder, outputs.for_asset(asset), chosen_maps(outputs.for_asset(asset)))
+    with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
+        outputs = outputs.for_asset(asset)
+        check_outputs(folder, outputs, chosen_maps(outputs))
         with requires("train"):
             from .export.unwrapping import assemble
             from .train.saved import read_trained
-        with progress_bars(quiet=quiet) as progress:
-            found = assemble(asset, read_trained(trained, asset), Clock(progress), size=size, padding=options.margin)
+        with progress_bars(quiet=console.quiet) as progress:
+            found = assemble(asset, read_trained(trained, asset), Clock(progress), size=options.size, padding=margin)
             written = UnwrapResult(asset, found).write(folder, outputs, progress)
-    if not quiet:
-        show({**found.report["metrics"], **found.report["network"]}, written)
+    console.show({**found.report["metrics"], **found.report["network"]}, written)
     return 0
 
 

@@ -27,7 +27,7 @@ from .raw import raw_onnx
 if TYPE_CHECKING:
     from ..runtime.io.cloud import PointCloud
     from ..runtime.mesh import Asset, Atlas, Charts
-    from ..runtime.options import Options
+    from ..runtime.options import TrainOptions
     from ..runtime.progress import Clock
     from ..train.learn.networks import AtlasNetworks
     from ..train.pipeline import Trained
@@ -57,7 +57,7 @@ class Unwrapped:
 
 
 def train_asset(
-    asset: Asset, options: Options, clock: Clock, keep: Keep | None = None, cloud: PointCloud | None = None
+    asset: Asset, options: TrainOptions, clock: Clock, keep: Keep | None = None, cloud: PointCloud | None = None
 ) -> Trained:
     """Charts and networks by the preset asked for.
 
@@ -115,7 +115,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
 
 
-def paper_config(options: Options) -> PaperConfig:
+def paper_config(options: TrainOptions) -> PaperConfig:
     """The settings of preset paper that these options ask for."""
     plain = PaperConfig()
     names = options.ablation

@@ -9,9 +9,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .console import Flag, Output, show
+from .console import show
 from .errors import InputError
-from .options import Options
+from .options import AtlasOptions, Flag, Output
 
 SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
 
@@ -20,10 +20,10 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
     """Chart and uv of any points of an unwrapped surface, without torch and without the mesh.
 
     Args:
-        bundle: the .onnx file that unwrap wrote
-        points: .npy, .npz, .csv or .ply, in the units of the source file
-        output: .npz or .csv, receives points, uv, chart and score
-        force: overwrite the file
+        bundle: The ONNX file that unwrap wrote.
+        points: A file of points (npy, npz, csv or ply) in the units of the source file.
+        output: The file for points, uv, chart and score: npz or csv.
+        force: Overwrite that file.
     """
     from .files import OutputFolder, write_whole
     from .io.pointfile import check_output, read_points, write_unwrapped
@@ -43,12 +43,12 @@ def evaluate(
     """Metrics of a mesh with uv, whoever made it.
 
     Args:
-        mesh: a mesh with uv
-        size: atlas side in texels, for texel density and bleeding
-        as_json: print JSON
+        mesh: A mesh with uv.
+        size: Side of the atlas in texels, which texel density and bleeding are measured for.
+        as_json: Print JSON.
     """
     if size is not None:
-        Options(size=size)
+        AtlasOptions(size=size)
     from .geometry.metrics import measure
     from .io.meshfile import load
 
@@ -69,10 +69,10 @@ def sample(name: str, *, output: Output, resolution: int | None = None, force: F
     """Write a procedural test surface.
 
     Args:
-        name: sphere, torus, trefoil, gyroid, bracket, cloth, …
-        output: .ply, .obj, .stl, .off or .glb
-        resolution: edges along the longest line
-        force: overwrite the file
+        name: The surface: sphere, torus, trefoil, gyroid, bracket, cloth, …
+        output: The file to write: ply, obj, stl, off or glb.
+        resolution: The number of edges along the longest line.
+        force: Overwrite that file.
     """
     from .files import OutputFolder, write_whole
     from .samples import make_sample

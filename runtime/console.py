@@ -1,15 +1,18 @@
-"""What the command line says, and types its commands share.  Results go to stdout, complaints to stderr."""
+"""What the command line says.  Results go to stdout; progress, notes and complaints go to stderr."""
 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from .options import Flag
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 SUMMARY = {
     "charts": "{}",
@@ -25,19 +28,35 @@ SUMMARY = {
     "missed_share": "{:.2%}",
 }
 
-Output = Annotated[Path, Parameter(name=["--output", "-o"])]
-Flag = Annotated[bool, Parameter(negative="")]
+
+@dataclass(frozen=True, kw_only=True)
+class Console:
+    """How a command behaves towards the user and the files that lie there."""
+
+    quiet: Flag = False
+    """Print neither progress nor notes nor a summary; errors are still printed."""
+    force: Flag = False
+    """Overwrite files that flexpara did not write."""
+
+    def show(self, numbers: dict[str, Any], files: Sequence[Path]) -> None:
+        """The summary on stdout, one figure a line, then the files; nothing when quiet."""
+        if not self.quiet:
+            show(numbers, files)
+
+    def note(self, fact: str) -> None:
+        """One line on stderr about something the user should know and need not mend; nothing when quiet."""
+        if not self.quiet:
+            sys.stderr.write(f"flexpara: note: {' '.join(fact.split())}\n")
+
+
+Manners = Annotated[Console, Parameter(name="*")]
+"""The same as options of a command."""
 
 
 def complain(message: str, code: int) -> int:
-    """One line on stderr."""
+    """One line on stderr; returns the code."""
     sys.stderr.write(f"flexpara: error: {' '.join(message.split())}\n")
     return code
-
-
-def names(text: str) -> tuple[str, ...]:
-    """Comma-separated words; "none" is no word."""
-    return () if text == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
 
 
 def show(numbers: dict[str, Any], files: Sequence[Path]) -> None:

@@ -1,15 +1,28 @@
-"""What a user may ask of an unwrap, and what is written.  Checked when made; sizes and paddings are in texels."""
+"""What a user may ask for: one frozen dataclass for each concern, taken by the command line and by the Python API.
 
-from __future__ import annotations
+A field is an option: its name, default and type stand here, and the text under it is its help.  Commands take these
+classes as they are (cyclopts flattens them); the API makes them of keywords with `from_keywords`.  So a new option is
+one field here and its use.  Values are checked when an object is made.  Sizes and paddings are in texels.
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+Annotations are evaluated here, unlike in other modules: cyclopts reads those of fields that other classes inherit.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+from cyclopts import Parameter
 
 from .errors import InputError
 
 if TYPE_CHECKING:
+    from cyclopts import Token
+
     from .mesh import Asset
 
+Chosen = TypeVar("Chosen")
 SIZES = (16, 16384)
 PRESETS = ("fast", "paper")
 MODES = ("multi-chart", "global")
@@ -23,57 +36,113 @@ PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_0
 AUTO = "auto"
 
 
-@dataclass(frozen=True)
-class Options:
-    """What decides an unwrap, together with the surface.
+def names(text: str) -> tuple[str, ...]:
+    """Comma-separated words; "none" is no word."""
+    return () if text == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
 
-    charts: K ≥ 1, the most charts a connected surface may get.  size: atlas side, 16 to 16384 texels.
-    padding: texels kept free around each chart, 0 to size / 8; None is size / 256, at least 2.
-    seed: 0 to 2³² − 1.
-    preset: "fast" is seconds on a CPU; "paper" trains as published, which wants a GPU.
-    What follows is for preset "paper" alone.  mode: "global" (one chart) or "multi-chart".  steps: optimizer steps,
-    None as published (10,000).  width: channels of hidden layers, None as published (512).  points: of the surface, in
-    each step, 16 to 1,000,000; None is 4900.  precision: "float32" or "bfloat16".  ablation: names out of ABLATIONS.
 
-    Raises: InputError for a value outside these.
-    """
+def _from_words(_kind: object, tokens: "Sequence[Token]") -> tuple[str, ...]:
+    return tuple(name for token in tokens for name in names(token.value))
 
-    charts: int = 8
-    size: int = 2048
-    padding: int | None = None
+
+def _shown(value: tuple[str, ...]) -> str:
+    return ",".join(value) or "none"
+
+
+COMMA_SEPARATED = Parameter(converter=_from_words, n_tokens=1, negative="", metavar="NAME,…", show_default=_shown)
+Names = Annotated[tuple[str, ...], COMMA_SEPARATED]
+"""Several names in one word of the command line."""
+Paths = Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)]
+"""An option that may be given several times."""
+Flag = Annotated[bool, Parameter(negative="", show_default=False)]
+"""An option without a value, off unless it is given."""
+Output = Annotated[Path, Parameter(name=["--output", "-o"])]
+PAPER = Parameter(group="Options of preset paper")
+"""Heading in the help."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seeded:
+    """Everything random follows from one number."""
+
     seed: int = 0
-    preset: str = "fast"
-    mode: str = "multi-chart"
-    steps: int | None = None
-    width: int | None = None
-    points: int | None = None
-    precision: str = "float32"
-    ablation: tuple[str, ...] = ()
+    """The start of all random numbers: the same seed on the same machine gives the same bytes."""
 
     def __post_init__(self) -> None:
-        (low, high), most, presets = SIZES, self.size // 8, ", ".join(PRESETS)
-        _demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
-        _demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
-        _demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
-        _demand(0 <= self.seed <= LARGEST_SEED, f"seed is {self.seed}, expected 0 to {LARGEST_SEED}; pass --seed 0")
-        _demand(self.preset in PRESETS, f"preset is {self.preset!r}, expected one of {presets}; leave --preset out")
-        self._check_paper()
+        found = f"seed is {self.seed}, expected 0 to {LARGEST_SEED}"
+        demand(0 <= self.seed <= LARGEST_SEED, f"{found}; pass for instance --seed 0")
 
-    def _check_paper(self) -> None:
-        """What preset "paper" alone can be asked."""
+
+@dataclass(frozen=True, kw_only=True)
+class PaperOptions:
+    """What preset "paper" alone can be asked."""
+
+    mode: Annotated[Literal["multi-chart", "global"], PAPER] = "multi-chart"
+    """Whether the paper's method makes several charts or one chart of the whole surface."""
+    steps: Annotated[int | None, PAPER] = None
+    """Steps of the optimizer; 10000 by default, as published."""
+    width: Annotated[int | None, PAPER] = None
+    """Channels of the networks' hidden layers; 512 by default, as published."""
+    points: Annotated[int | None, PAPER] = None
+    """Points of the surface that each step looks at; 4900 by default.  Fewer are faster."""
+    precision: Annotated[Literal["float32", "bfloat16"], PAPER] = "float32"
+    """Number format of the networks' matrix products; bfloat16 is faster and less exact."""
+    ablation: Annotated[Names, PAPER] = ()
+    """Parts of the paper's losses that are left out of mode global (no-triangle, no-differential, no-upper, no-lower)
+    or added to mode multi-chart (bidirectional, chart-differential)."""
+
+    def __post_init__(self) -> None:
         for name, known in (("mode", MODES), ("precision", PRECISIONS)):
-            value = getattr(self, name)
-            _demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
+            demand_known(name, getattr(self, name), known)
         for name in self.ablation:
-            _demand(name in ABLATIONS, f"ablation is {name!r}, expected some of {', '.join(ABLATIONS)}; correct it")
+            demand(name in ABLATIONS, f"ablation is {name!r}, expected some of {', '.join(ABLATIONS)}; correct it")
         for name, (least, most) in PAPER_RANGES.items():
             value = getattr(self, name)
             fits = value is None or least <= value <= most
-            _demand(fits, f"{name} is {value}, expected {least} to {most}; leave --{name} out")
-        for name in ("mode", "steps", "width", "points", "precision", "ablation"):
-            value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
-            found = f"{name} is {value!r}, expected {default!r} with preset {self.preset}"
-            _demand(self.preset == "paper" or value == default, f"{found}; add --preset paper, or leave it out")
+            demand(fits, f"{name} is {value}, expected {least} to {most}; leave --{name} out")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChartOptions:
+    """What is asked of the charts, and how they are found."""
+
+    charts: int = 8
+    """The most charts that each connected part of the surface may get."""
+    preset: Literal["fast", "paper"] = "fast"
+    """The way of training: fast takes seconds on a CPU; paper trains as published, which wants a GPU."""
+
+    def __post_init__(self) -> None:
+        demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
+        demand_known("preset", self.preset, PRESETS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainOptions(Seeded, PaperOptions, ChartOptions):
+    """How the charts and their networks are made."""
+
+    def __post_init__(self) -> None:
+        for concern in (ChartOptions, PaperOptions, Seeded):
+            concern.__post_init__(self)
+        for field in fields(PaperOptions):
+            value = getattr(self, field.name)
+            found = f"{field.name} is {value!r}, expected {field.default!r} with preset {self.preset}"
+            fits = self.preset == "paper" or value == field.default
+            demand(fits, f"{found}; add --preset paper, or leave it out")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtlasOptions:
+    """The atlas as an image."""
+
+    size: int = 2048
+    """Side of the square atlas and of its textures, 16 to 16384 texels."""
+    padding: int | None = None
+    """Texels that are kept free around each chart; by default what the target asks for, else size / 256, at least 2."""
+
+    def __post_init__(self) -> None:
+        (low, high), most = SIZES, self.size // 8
+        demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
+        demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
 
     @property
     def margin(self) -> int:
@@ -81,59 +150,139 @@ class Options:
         return max(2, self.size // 256) if self.padding is None else self.padding
 
 
-@dataclass(frozen=True)
-class Outputs:
-    """What is written beside the ONNX file and the report.
+@dataclass(frozen=True, kw_only=True)
+class Options(AtlasOptions, TrainOptions):
+    """What decides an unwrap, together with the surface.
 
-    maps: names of maps, or "auto": normal, position, and what the source's materials have, else uv-checker.
-    formats: of "glb", "obj", "ply", "usda", at least one.  preview: whether the preview picture is drawn.
-    texture_format: for all maps that can be stored so; None is each map's own.
-    normal_format: green channel of the normal map, "opengl" (+Y) or "directx" (−Y).
-    inverse: whether the inverse map, `<stem>.wrap.onnx`, is made.
-    target: engine preset of file names, packing, depth and green channel; None is flexpara's own.
-    layers: all maps as layers of one EXR file, of 16 (half) or 32 bits (float) and OpenEXR's compression.
-    samples: per texel: 1, 4 or 16.  rays: per sample of ray-traced maps, 1 to 4096.
-
-    Raises: InputError for an unknown format.
+    Raises: InputError for a value outside what its field allows.
     """
 
-    maps: tuple[str, ...] = (AUTO,)
-    formats: tuple[str, ...] = ("glb",)
-    preview: bool = True
-    texture_format: Literal["png", "exr"] | None = None
-    normal_format: Literal["opengl", "directx"] = "opengl"
-    inverse: bool = False
+    def __post_init__(self) -> None:
+        TrainOptions.__post_init__(self)
+        AtlasOptions.__post_init__(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """Which maps are baked, and how they are stored."""
+
+    maps: Names = (AUTO,)
+    """The maps to bake, by name (flexpara bake --help lists them).  auto stands for normal, position, and what the
+    materials of the source have, or else a checker; none bakes nothing."""
     target: str | None = None
-    layers: bool = False
-    exr_bits: Literal[16, 32] = 32
-    exr_compression: str = "zip"
+    """The engine that the files are for: gltf, unreal, unity, godot, blender or usd.  It decides about file names,
+    packed channels, bit depth, green channel and padding."""
+    texture_format: Literal["png", "exr"] | None = None
+    """File type of all maps that can be stored so; by default each map has its own."""
+    normal_format: Literal["opengl", "directx"] = "opengl"
+    """Direction of the normal map's green channel: opengl is +Y, directx is -Y."""
     samples: int = 1
+    """Samples of each texel: 1, 4 or 16."""
     rays: int = 64
+    """Rays of each sample, 1 to 4096, for the maps that are ray-traced."""
+    layers: Flag = False
+    """Write all maps as layers of one file, STEM.exr."""
+    exr_bits: Literal[16, 32] = 32
+    """Bits of each channel of that file: 16 (half) or 32 (float)."""
+    exr_compression: str = "zip"
+    """Compression of that file, by OpenEXR's name: zip, zips, piz, rle, none, …"""
+
+    def __post_init__(self) -> None:
+        kind, green = self.texture_format, self.normal_format
+        demand(kind in (None, "png", "exr"), f"texture format is {kind!r}, expected png or exr; choose one of them")
+        demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
+        demand(self.samples in (1, 4, 16), f"samples is {self.samples}, expected 1, 4 or 16; choose one of them")
+        demand(1 <= self.rays <= 4096, f"rays is {self.rays}, expected 1 to 4096; pass for instance --rays 64")
+        both = self.layers and self.target is not None
+        demand(not both, f"layers with target {self.target}, expected one of the two; leave the other out")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """What is written beside the ONNX file, the maps and the report."""
+
+    formats: Annotated[Names, Parameter(name="--format")] = ("glb",)
+    """Mesh files to write: some of glb, obj, ply, usda."""
+    inverse: Flag = False
+    """Also write STEM.wrap.onnx, the network from uv and chart to point and normal."""
+    preview: bool | None = None
+    """Draw STEM.preview.png; by default where maps are baked."""
 
     def __post_init__(self) -> None:
         found, known = ", ".join(self.formats), ", ".join(FORMATS)
         usable = len(self.formats) > 0 and set(self.formats) <= set(FORMATS)
-        _demand(usable, f"format is {found!r}, expected some of {known}; pass for instance --format glb")
-        kind, green = self.texture_format, self.normal_format
-        _demand(kind in (None, "png", "exr"), f"texture format is {kind!r}, expected png or exr; choose one of them")
-        _demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
-        _demand(self.samples in (1, 4, 16), f"samples is {self.samples}, expected 1, 4 or 16; choose one of them")
-        _demand(1 <= self.rays <= 4096, f"rays is {self.rays}, expected 1 to 4096; pass for instance --rays 64")
+        demand(usable, f"format is {found!r}, expected some of {known}; pass for instance --format glb")
 
-    def for_asset(self, asset: Asset) -> Outputs:
-        """The same with "auto" replaced by the maps it stands for, each map once."""
+
+@dataclass(frozen=True, kw_only=True)
+class Outputs(FileOptions, MapOptions):
+    """What an unwrap writes.
+
+    Raises: InputError for a value outside what its field allows.
+    """
+
+    def __post_init__(self) -> None:
+        MapOptions.__post_init__(self)
+        FileOptions.__post_init__(self)
+        named = sorted({"obj", "usda"} & set(self.formats))
+        found = f"layers with format {', '.join(named)}, whose materials name one file a map"
+        demand(not (self.layers and named), f"{found}, expected glb or ply; leave one of the two out")
+
+    def for_asset(self, asset: "Asset") -> "Outputs":
+        """The same for one mesh: "auto" replaced by the maps it stands for, each map once, and preview decided."""
         from .material import source_maps
 
         auto = ("normal", "position", *(source_maps(asset) or ("uv-checker",)))
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
-        return replace(self, maps=tuple(dict.fromkeys(maps)))
+        drawn = bool(self.maps) if self.preview is None else self.preview
+        return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
 
-    def for_points(self) -> Outputs:
+    def for_points(self) -> "Outputs":
         """The same without the triangles as ply, whose name the points have; glb where that leaves none."""
         left = tuple(name for name in self.formats if name != "ply")
         return replace(self, formats=left or ("glb",))
 
 
-def _demand(holds: bool, message: str) -> None:
+@dataclass(frozen=True, kw_only=True)
+class CheckpointOptions:
+    """Long runs that may be cut short."""
+
+    every: Annotated[int | None, Parameter(name="--checkpoint-every", group=PAPER.group)] = None
+    """Steps between two checkpoints, from which --resume goes on; by default none are kept."""
+    resume: Path | None = None
+    """The output folder of a run with checkpoints that was cut short.  It goes on with its own mesh and options, so
+    nothing else may be given."""
+
+
+def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str, Any]) -> Chosen:
+    """Options as the Python API takes them: an object made before, keywords, or both, where keywords replace fields.
+
+    A field of several names takes any sequence of them, or one comma-separated word.
+
+    Raises: InputError for an unknown keyword, or a value that its field refuses.
+    """
+    start = kind() if made is None else made
+    defaults = {field.name: field.default for field in fields(kind)}  # pyright: ignore[reportArgumentType]
+    for name in keywords:
+        close = get_close_matches(name, defaults, 1)
+        remedy = f"pass {close[0]}" if close else "leave it out"
+        demand(name in defaults, f"{name} is no option, expected some of {', '.join(sorted(defaults))}; {remedy}")
+    values = {
+        name: _as_names(value) if isinstance(defaults[name], tuple) else value for name, value in keywords.items()
+    }
+    return replace(start, **values)  # pyright: ignore[reportArgumentType]
+
+
+def _as_names(value: str | Sequence[str]) -> tuple[str, ...]:
+    return names(value) if isinstance(value, str) else tuple(value)
+
+
+def demand_known(name: str, value: str, known: Sequence[str]) -> None:
+    """Raises InputError for a value of an option that is none of those known."""
+    demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
+
+
+def demand(holds: bool, message: str) -> None:
+    """Raises InputError with a message of value, expectation and remedy."""
     if not holds:
         raise InputError(message)

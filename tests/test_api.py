@@ -109,3 +109,28 @@ def test_options_are_checked_before_anything_is_read(tmp_path: Path, instant_tra
         unwrapped().save(tmp_path / "out", maps=("shiny",))
     assert not (tmp_path / "out").exists()
     assert len(instant_training) == 1
+
+
+def test_options_are_made_once_or_given_as_keywords() -> None:
+    made = flexpara.Options(charts=5, size=64, padding=1)
+    plain = flexpara.unwrap((VERTICES, FACES), charts=5, size=64, padding=1)
+    both = flexpara.unwrap((VERTICES, FACES), flexpara.Options(charts=3, size=64), charts=5, padding=1)
+    settings = [flexpara.unwrap((VERTICES, FACES), made).report["settings"], plain.report["settings"]]
+    assert settings[0] == settings[1] == both.report["settings"]
+    assert settings[0]["charts"] == 5
+
+
+def test_outputs_are_made_once_or_given_as_keywords(tmp_path: Path) -> None:
+    made = flexpara.Outputs(maps=("chart", "position"), formats=("obj",), preview=False)
+    first = unwrapped().save(tmp_path / "made", made)
+    second = unwrapped().save(tmp_path / "keywords", maps="chart,position", formats=["obj"], preview=False)
+    assert [path.name for path in first] == [path.name for path in second]
+    assert "mesh_chart.png" in {path.name for path in first}
+
+
+def test_an_unknown_keyword_is_refused_with_the_name_meant(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"chart is no option, expected some of .*; pass charts"):
+        flexpara.unwrap((VERTICES, FACES), chart=5)
+    with pytest.raises(InputError, match=r"colour is no option, expected some of .*; leave it out"):
+        unwrapped().save(tmp_path / "out", colour=1)
+    assert not (tmp_path / "out").exists()

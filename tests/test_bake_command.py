@@ -39,6 +39,13 @@ def test_a_target_names_its_files(square: Path) -> None:
     assert report["settings"]["rays"] == 4
 
 
+def test_every_option_is_in_the_report(square: Path) -> None:
+    _, report = baked(square, "--maps", "position", "--normal-format", "directx", "--exr-bits", "16", "--seed", "7")
+    asked = {"normal_format": "directx", "exr_bits": 16, "seed": 7, "maps": ["position"], "padding": 2, "high": []}
+    assert {name: report["settings"][name] for name in asked} == asked
+    assert {"udim", "cage", "match_names", "fields", "layers", "texture_format"} <= set(report["settings"])
+
+
 def test_layers_share_one_file(square: Path) -> None:
     files, report = baked(square, "--maps", "normal,position", "--layers", "--exr-bits", "16")
     assert files == {"square.exr"}
@@ -66,6 +73,7 @@ def test_a_high_poly_mesh_gives_the_height(square: Path) -> None:
     [
         ["--target", "cryengine"],
         ["--udim", "--layers"],
+        ["--layers", "--target", "unreal"],
         ["--rays", "0"],
         ["--samples", "3"],
         ["--layers", "--exr-compression", "jpeg"],

@@ -110,7 +110,7 @@ def test_a_wrong_command_line_names_the_word_and_the_help(
         ("--padding", -1, "padding is -1"),
         ("--padding", 1000, "padding is 1000"),
         ("--seed", -1, "seed is -1"),
-        ("--preset", "slow", "'slow'"),
+        ("--preset", "slow", '"slow"'),
         ("--maps", "normal,shiny", "shiny"),
         ("--format", "glb,fbx", "fbx"),
         ("--format", "", "format"),

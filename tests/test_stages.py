@@ -31,7 +31,8 @@ def test_train_then_export_writes_what_unwrap_writes(square: Path, tmp_path: Pat
     assert main(["unwrap", str(square), "-o", str(tmp_path / "one"), "--maps", "none", "--size", "64", *QUIET]) == 0
     assert main(["train", str(square), "-o", str(tmp_path / "half"), "--quiet"]) == 0
     trained = tmp_path / "half" / "square.trained.safetensors"
-    assert main(["export", str(trained), str(square), "-o", str(tmp_path / "two"), "--size", "64", *QUIET]) == 0
+    words = ["--maps", "none", "--size", "64", *QUIET]
+    assert main(["export", str(trained), str(square), "-o", str(tmp_path / "two"), *words]) == 0
     for name in ("square.onnx", "square.glb"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
     report = json.loads((tmp_path / "half" / "square.train.json").read_text(encoding="utf-8"))
@@ -77,6 +78,14 @@ def test_a_run_that_is_cut_short_is_resumed_with_its_own_options(
     assert main(["unwrap", "--resume", str(out), "--quiet"]) == 130
     assert seen[0] == seen[1]
     assert seen[0][1] == (out / "square.checkpoint", 4)
+
+
+@pytest.mark.parametrize("words", [["--charts", "3"], ["--maps", "none"], ["mesh.obj"], ["--checkpoint-every", "4"]])
+def test_a_resumed_run_takes_no_other_options(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["unwrap", *words, "--resume", str(tmp_path)]) == 2
+    assert "resume beside other options" in capsys.readouterr().err
 
 
 def test_nothing_to_resume_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

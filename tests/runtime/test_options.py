@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import pytest
 
+from flexpara.bake.commands import BakeOptions, HighOptions
+from flexpara.runtime.console import Console
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Surface
-from flexpara.runtime.options import Options, Outputs
+from flexpara.runtime.options import CheckpointOptions, Options, Outputs, TrainOptions, from_keywords
 
 SURFACE = Surface(np.eye(3), np.array([[0, 1, 2]]))
 
@@ -64,6 +70,13 @@ def test_an_unknown_format_is_refused(wrong: dict[str, Any]) -> None:
         Outputs(**wrong)
 
 
+@pytest.mark.parametrize("wrong", [{"target": "unreal"}, {"formats": ("glb", "obj")}, {"formats": ("usda",)}])
+def test_layers_do_not_fit_what_names_one_file_a_map(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"layers with .*expected .*leave"):
+        Outputs(layers=True, **wrong)
+    Outputs(layers=True)
+
+
 def test_auto_shows_the_colours_of_the_source_or_else_a_checker() -> None:
     picture = Material(pictures={"base-color": Picture(np.zeros((1, 1, 4), np.uint8))})
     assert Outputs().for_asset(asset()).maps == ("normal", "position", "uv-checker")
@@ -76,3 +89,38 @@ def test_maps_are_kept_in_order_and_once() -> None:
     outputs = Outputs(maps=("chart", "auto", "normal")).for_asset(asset())
     assert outputs.maps == ("chart", "normal", "position", "uv-checker")
     assert Outputs(maps=()).for_asset(asset()).maps == ()
+
+
+def test_a_preview_is_drawn_where_maps_are_unless_decided() -> None:
+    assert Outputs().for_asset(asset()).preview is True
+    assert Outputs(maps=()).for_asset(asset()).preview is False
+    assert Outputs(maps=(), preview=True).for_asset(asset()).preview is True
+    assert Outputs(preview=False).for_asset(asset()).preview is False
+
+
+def helps(kind: type) -> dict[str, str]:
+    """The text under each field, by the field's name; of the classes it inherits too."""
+    found: dict[str, str] = {}
+    for owner in reversed(kind.__mro__[:-1]):
+        body = next(iter(ast.parse(textwrap.dedent(inspect.getsource(owner))).body))
+        assert isinstance(body, ast.ClassDef)
+        for field, text in zip(body.body, body.body[1:], strict=False):
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                found[ast.unparse(field.target)] = str(text.value.value)
+    return found
+
+
+@pytest.mark.parametrize("kind", [Options, Outputs, TrainOptions, CheckpointOptions, BakeOptions, HighOptions, Console])
+def test_every_option_is_explained_in_a_sentence(kind: Any) -> None:
+    texts = helps(kind)
+    assert {field.name for field in fields(kind)} <= set(texts)
+    assert [name for name, text in texts.items() if not (text[0].isupper() or text.startswith("auto"))] == []
+    assert [name for name, text in texts.items() if not text.endswith((".", "…"))] == []
+
+
+def test_keywords_replace_fields_of_what_was_made() -> None:
+    made = Options(charts=3, seed=5)
+    assert from_keywords(Options, made, {"charts": 4}) == Options(charts=4, seed=5)
+    assert from_keywords(Outputs, None, {"maps": "ao, normal", "formats": ["obj"]}).maps == ("ao", "normal")
+    with pytest.raises(InputError, match="seed is -1"):
+        from_keywords(Options, made, {"seed": -1})

@@ -18,7 +18,12 @@ PAPER = Options(charts=3, preset="paper", steps=50, ablation=("no-upper",), mode
 
 
 def run(folder: Path, **parts: Any) -> Run:
-    settings: dict[str, Any] = {"options": PAPER, "outputs": Outputs(("normal",), ("glb", "obj")), "every": 10, **parts}
+    settings: dict[str, Any] = {
+        "options": PAPER,
+        "outputs": Outputs(maps=("normal",), formats=("glb", "obj")),
+        "every": 10,
+        **parts,
+    }
     return Run(folder / "bunny.obj", folder / "out", **settings)
 
 
