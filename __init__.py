@@ -219,7 +219,8 @@ class UnwrapResult:
 
     def write(self, output: OutputFolder, outputs: Outputs, progress: Progress | None = None) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder."""
-        from .bake.output import check_outputs, chosen_maps, write_outputs
+        from .bake.checks import check_outputs, chosen_maps
+        from .bake.output import write_outputs
         from .export.unwrapping import invert
         from .runtime.progress import Clock
 

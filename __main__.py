@@ -17,8 +17,8 @@ from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
 from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cloud
+from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
-from .bake.output import check_outputs, chosen_maps, padding_of
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Console, Manners, complain
 from .runtime.errors import FlexparaError, InputError

@@ -1,43 +1,38 @@
 """Baking: one context, one G-buffer, every map a function of it; then gutters; files last.
 
-h w texels, row 0 = top · t texels of one call.  `bake` makes Textures in memory, `write_textures` makes files of them.
+h w texels, row 0 = top · t texels of one call.  `bake` makes Textures in memory, files/textures.py makes files of them.
 """
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..runtime.errors import InputError
-from .files.images import Texture, write_texture
-from .maps.functions import SurfaceFunction, function_map, surface_alone
-from .maps.maps import BakeMap, NormalFormat, find_map
-from .raster.context import open_context
-from .raster.gbuffer import GBuffer, rasterize
+from .maps.catalogue import find_map
+from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
-from .raster.tiles import Plan, blank_gbuffer, computed, map_windows, open_rasterizer
+from .raster.plan import Plan, open_rasterizer
 from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_changes, seam_error
+from .texture import Texture
+from .windows import background_of, blank_gbuffer, computed, map_windows, put_together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
-    from .files.images import FileType
-    from .raster.tiles import BakedWindow, Device
+    from .bakemap import BakeMap, NormalFormat
+    from .raster.plan import Device
 
 VISIBLE = 0.5 / 255.0
 """Difference across a seam, as a share of a map's range, up to which gutters stay as they are."""
-WRITERS = 2
-"""Files encoded at once: each holds a whole image in memory."""
 
 
 def bake(
@@ -108,30 +103,6 @@ def bake(
     return {entry.name: as_texture(entry, pixels[entry.name]) for entry in chosen}
 
 
-def put_together(
-    windows: Iterable[BakedWindow], size: int, scratch: Path | None
-) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Windows → name → image (size, size, c), and which texels hold a surface and lie inside of it, (size, size) bool.
-
-    One window is put into the images while the next is made.
-    """
-    images: dict[str, NDArray[np.float32]] = {}
-    covered, inside = np.zeros((2, size, size), np.bool_)
-    with ThreadPoolExecutor(1) as filler:
-        filled: Future[None] | None = None
-        for baked in windows:
-            if filled is not None:
-                filled.result()
-            for name, part in baked.maps.items():
-                images[name] = with_channels(images.get(name), part.shape[2], size, scratch)
-            covered[baked.window.rows, baked.window.columns] = baked.covered
-            inside[baked.window.rows, baked.window.columns] = baked.inside
-            filled = filler.submit(put_window, baked, dict(images))
-        if filled is not None:
-            filled.result()
-    return images, covered, inside
-
-
 def find_maps(
     maps: Sequence[str | BakeMap] | Mapping[str, SurfaceFunction], *, normal_format: NormalFormat = "opengl"
 ) -> list[BakeMap]:
@@ -145,50 +116,6 @@ def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int
     """(size, size) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.bleed_free_mip` takes."""
     labels = bake(atlas, {"chart": lambda _, __, face: atlas.face_chart[face] + 1}, size=size, padding=padding)
     return labels["chart"].pixels[..., 0].astype(np.int32) - 1
-
-
-def make_gbuffer(atlas: Atlas, size: int) -> GBuffer:
-    """Rasterize in a context of its own.  Raises as `open_context` and `rasterize`."""
-    check_size(size)
-    with open_context() as context:
-        return rasterize(context, atlas, size)
-
-
-def put_window(baked: BakedWindow, images: Mapping[str, NDArray[np.float32]]) -> None:
-    """The maps of a window into the images; alpha is 1 where the window has none."""
-    for name, part in baked.maps.items():
-        target = images[name][baked.window.rows, baked.window.columns]
-        target[..., : part.shape[2]] = part
-        target[..., part.shape[2] :] = 1.0
-
-
-def background_of(entry: BakeMap, image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(c,) float32: what lies beyond gutters, in as many channels as the image has."""
-    return np.asarray((*entry.background, 1.0)[: image.shape[2]], np.float32)
-
-
-def with_channels(
-    image: NDArray[np.float32] | None, channels: int, size: int, scratch: Path | None = None
-) -> NDArray[np.float32]:
-    """An image (size, size, c) of at least so many channels: new, as it is, or with alpha 1 added.
-
-    The number of channels may differ from window to window: a map leaves out alpha where it is 1.
-    """
-    if image is not None and image.shape[2] >= channels:
-        return image
-    wider = new_image((size, size, channels), scratch)
-    if image is not None:
-        wider[..., : image.shape[2]] = image
-        wider[..., image.shape[2] :] = 1.0
-    return wider
-
-
-def new_image(shape: tuple[int, int, int], scratch: Path | None) -> NDArray[np.float32]:
-    """Zeros (h, w, c) float32 in memory, or in a file without a name in a folder, which goes when the array goes."""
-    if scratch is None:
-        return np.zeros(shape, np.float32)
-    with tempfile.TemporaryFile(dir=scratch) as file:
-        return np.memmap(file, np.float32, "w+", shape=shape)
 
 
 def close_seams(
@@ -216,39 +143,6 @@ def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:
     return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)
 
 
-def texture_names(
-    textures: Mapping[str, Texture | BakeMap], stem: str, *, file_type: FileType | None = None
-) -> dict[str, str]:
-    """Map → file name `<stem>_<map>.png|exr`, known before anything is baked.
-
-    file_type overrules the maps' own where they can be stored that way.
-    """
-    endings = {name: _ending(texture, file_type) for name, texture in textures.items()}
-    return {name: f"{stem}_{name}.{ending}" for name, ending in endings.items()}
-
-
-def write_textures(
-    textures: Mapping[str, Texture], folder: Path, stem: str, *, file_type: FileType | None = None
-) -> list[Path]:
-    """Write all textures into an existing folder; the paths, in the order of the maps.
-
-    Files are not staged here: the caller hands a folder that may hold a part of them when this fails.
-    Raises: EncodingError as `images.write_texture`.
-    """
-    names = texture_names(textures, stem, file_type=file_type)
-    paths = [folder / names[name] for name in textures]
-    with ThreadPoolExecutor(WRITERS) as pool:
-        list(pool.map(write_texture, textures.values(), paths))  # list: waits, and raises what was raised
-    return paths
-
-
 def _announce(progress: Callable[[str], None] | None, name: str) -> None:
     if progress is not None:
         progress(name)
-
-
-def _ending(texture: Texture | BakeMap, file_type: FileType | None) -> FileType:
-    """The file type asked for, but EXR for what a PNG cannot hold."""
-    if texture.encoding == "linear":
-        return "exr"
-    return file_type or texture.file_type

@@ -14,7 +14,8 @@ from ..runtime.errors import InputError
 from ..runtime.extras import requires
 from ..runtime.options import AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
 from ..runtime.progress import Clock, progress_bars
-from .output import bleeding, check_outputs, chosen_maps, padding_of, texture_facts, with_tangents, write_textures
+from .checks import check_outputs, chosen_maps, padding_of
+from .output import bake_textures, bleeding, texture_facts, with_tangents
 
 if TYPE_CHECKING:
     from .highpoly.highmaps import HighSource
@@ -81,15 +82,16 @@ def bake(
     """
     padding = padding_of(options.padding, options.target, options.size)
     options, outputs = replace(options, padding=padding), options.outputs
-    chosen_maps(outputs)
+    high = _high_source(source)
+    chosen_maps(outputs, high=high)
     from ..runtime.files import OutputFolder
     from ..runtime.io.meshfile import load
     from ..runtime.pack.packing import atlas_from_uv
 
     asset = load(mesh)
-    high = _high_source(source)
     entries = chosen_maps(outputs.for_asset(asset), high=high, fields=options.fields, seed=options.seed)
-    atlas = with_tangents(replace(atlas_from_uv(asset), size=options.size), entries)
+    atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
+    atlas = with_tangents(atlas, entries)
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
     facts["settings"] = settings(options, source) | {"maps": [entry.name for entry in entries]}
     report = f"{asset.stem}.bake.json"
@@ -105,7 +107,7 @@ def bake(
                 folder.write_several(lambda path: write_udim(tiles, path, asset.stem, file_type=kind))
                 facts["tiles"] = list(tiles)
             else:
-                baked = write_textures(folder, atlas, asset, outputs, entries, options.margin, Clock(progress))
+                baked = bake_textures(folder, atlas, asset, outputs, entries, Clock(progress))
                 facts["textures"] = texture_facts(atlas, baked)
                 facts["textures"]["bleed_free_mip"] = bleeding(atlas, options.size, options.margin)
         facts |= {} if high is None else {"high": high.report()}

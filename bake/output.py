@@ -1,4 +1,4 @@
-"""What a run writes: textures, meshes and the preview, into an OutputFolder; and early refusals.   sizes in texels.
+"""What a run writes: textures, meshes and the preview, into an OutputFolder.   sizes in texels.
 
 OpenGL and image libraries are imported when something needs them: an obj file alone does without.
 """
@@ -8,12 +8,12 @@ from __future__ import annotations
 import tempfile
 import warnings
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from ..runtime.errors import InputError, MissingDependencyError
+from ..runtime.errors import MissingDependencyError
 from ..runtime.extras import requires
+from .checks import exr_settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,10 +22,8 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas
     from ..runtime.options import Outputs
     from ..runtime.progress import Clock
-    from .files.exr import ExrSettings
-    from .files.images import Texture
-    from .highpoly.highmaps import HighSource
-    from .maps.maps import BakeMap
+    from .bakemap import BakeMap
+    from .texture import Texture
 
 LARGE = 8192
 """Side from which images are kept on disk while they are baked."""
@@ -41,100 +39,6 @@ class Baked:
     files: dict[str, str]
 
 
-def chosen_maps(
-    outputs: Outputs, *, high: HighSource | None = None, fields: Sequence[Path] = (), seed: int = 0
-) -> list[BakeMap]:
-    """The maps asked for, without "auto".
-
-    Args:
-        outputs: names, normal format, rays.
-        high: high-poly meshes that the maps are taken from.
-        fields: ONNX files, one more map each.
-        seed: of the rays.
-
-    Raises: InputError for an unknown map or a field that is none; MissingDependencyError without flexpara[bake].
-    """
-    if not outputs.maps and not fields:
-        return []
-    with requires("bake"):
-        from .maps.field import field_map
-        from .maps.maps import find_map
-        from .maps.rays import RaySettings
-    green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
-    entries = [find_map(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
-    if high is not None:
-        entries = [high.map(entry, normal_format=green, rays=rays) for entry in entries]
-    return [*entries, *(field_map(path) for path in fields)]
-
-
-def check_outputs(
-    output: OutputFolder, outputs: Outputs, maps: Sequence[BakeMap], *, more: Sequence[str] = (), meshes: bool = True
-) -> None:
-    """Refuse early what writing would refuse after the work: foreign files, packages that are absent.
-
-    more: further file names.  meshes: whether meshes and networks are written.
-
-    Raises: InputError, ForeignFileError, MissingDependencyError.
-    """
-    if meshes and "usda" in outputs.formats:
-        check_green(outputs)
-    names = [*possible_files(output.stem, outputs, maps), *more]
-    if meshes:
-        endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
-        names += [f"{output.stem}.{ending}" for ending in endings]
-        names += [f"{output.stem}.preview.png"] if outputs.preview else []
-    output.check([*names, output.report_name])
-    wanted = {
-        "baker": bool(maps),
-        "files.gltf": meshes and "glb" in outputs.formats,
-        "pictures.preview": outputs.preview,
-    }
-    with requires("bake"):
-        for module in (name for name, needed in wanted.items() if needed):
-            import_module(f".{module}", __package__)
-
-
-def check_green(outputs: Outputs) -> None:
-    """USD reads +Y, and a usda file names the normal map beside it.  Raises: InputError where that is −Y."""
-    with requires("bake"):
-        from .files.targets import find_target
-    green = outputs.normal_format if outputs.target is None else find_target(outputs.target).green
-    if green != "opengl":
-        raise InputError(f"format usda beside {green} normal maps, expected opengl; leave usda or that choice out")
-
-
-def padding_of(padding: int | None, target: str | None, size: int) -> int | None:
-    """The padding asked for, else that of the target, else None.  Raises: InputError for an unknown target."""
-    if target is None:
-        return padding
-    with requires("bake"):
-        from .files.targets import find_target
-    preset = find_target(target)
-    return preset.padding(size) if padding is None else padding
-
-
-def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list[str]:
-    """Texture files that these maps may become; with a target, both endings that a product may get.
-
-    Raises: InputError for an unknown target.
-    """
-    if not maps:
-        return []
-    if outputs.layers:
-        exr_settings(outputs)
-        return [f"{stem}.exr"]
-    if outputs.target is None:
-        from .baker import texture_names
-
-        return list(
-            texture_names({entry.name: entry for entry in maps}, stem, file_type=outputs.texture_format).values()
-        )
-    from .files.targets import find_target
-
-    plain = find_target(outputs.target).file_names([entry.name for entry in maps], stem).values()
-    return [f"{name}.{ending}" for name in plain for ending in ("png", "exr")]
-
-
 def write_outputs(
     output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
 ) -> dict[str, Any]:
@@ -143,7 +47,7 @@ def write_outputs(
     outputs: without "auto".  Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
     """
     atlas = with_tangents(atlas, maps)
-    baked = write_textures(output, atlas, asset, outputs, maps, atlas.padding, clock)
+    baked = bake_textures(output, atlas, asset, outputs, maps, clock)
     with clock.stage("write"):
         write_meshes(output, atlas, asset, outputs, baked)
     if outputs.preview:
@@ -161,16 +65,10 @@ def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
     return split_by_tangents(atlas)
 
 
-def write_textures(
-    output: OutputFolder,
-    atlas: Atlas,
-    asset: Asset,
-    outputs: Outputs,
-    maps: Sequence[BakeMap],
-    padding: int,
-    clock: Clock,
+def bake_textures(
+    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
 ) -> Baked:
-    """Bake the maps and write them."""
+    """Bake the maps, in the atlas' size and padding, and write them."""
     if not maps:
         return Baked({}, {})
     from . import baker
@@ -180,7 +78,7 @@ def write_textures(
         atlas,
         asset,
         list(maps),
-        padding=padding,
+        padding=atlas.padding,
         samples=outputs.samples,
         scratch=Path(tempfile.gettempdir()) if atlas.size >= LARGE else None,
         progress=lambda name: clock("bake", names.index(name), len(names)),
@@ -209,19 +107,11 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
 
         output.write_several(write)
         return found
-    from .baker import texture_names
-    from .baker import write_textures as write_each
+    from .files.textures import texture_names, write_textures
 
     kind = outputs.texture_format
-    output.write_several(lambda folder: write_each(textures, folder, stem, file_type=kind))
+    output.write_several(lambda folder: write_textures(textures, folder, stem, file_type=kind))
     return texture_names(textures, stem, file_type=kind)
-
-
-def exr_settings(outputs: Outputs) -> ExrSettings:
-    """How layers are stored.  Raises: EncodingError for a compression that OpenEXR has not."""
-    from .files.exr import ExrSettings
-
-    return ExrSettings(outputs.exr_bits, cast("Any", outputs.exr_compression))
 
 
 def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
@@ -274,7 +164,7 @@ def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
     """The preview; without OpenGL a warning in its place."""
     from ..runtime.geometry.metrics import face_distortion
     from .pictures.preview import render_preview
-    from .raster.tiles import SoftwareWarning
+    from .raster.plan import SoftwareWarning
 
     stretch = face_distortion(asset.surface, atlas.corner_uv)
     try:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas
-    from .files.images import Texture
+    from .texture import Texture
 
 PER_TEXEL = 2.0
 """Samples per texel of a seam's length."""

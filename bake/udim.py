@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.errors import InputError
-from .baker import bake, texture_names, write_texture
+from .baker import bake
+from .files.images import write_texture
+from .files.textures import texture_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from ..runtime.mesh import Asset, Atlas
-    from .files.images import FileType, Texture
-    from .maps.maps import BakeMap
+    from .bakemap import BakeMap
+    from .texture import FileType, Texture
 
 FIRST, ACROSS, UP = 1001, 10, 100
 """Number of the first tile, tiles in a row, rows."""

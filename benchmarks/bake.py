@@ -24,15 +24,16 @@ import numpy as np
 
 from benchmarks.raster import COMMAND_BAR, RATE_BAR, command_seconds, drawing_rates
 from benchmarks.unwrap import ROOT, header, timed
-from flexpara.bake.baker import bake, make_gbuffer
+from flexpara.bake.baker import bake
 from flexpara.bake.files.images import write_texture
 from flexpara.bake.highpoly.cage import CageSettings
 from flexpara.bake.highpoly.highmaps import HighSource
 from flexpara.bake.highpoly.highmesh import atlas_of
-from flexpara.bake.maps.maps import find_map
 from flexpara.bake.maps.occlusion import ambient_occlusion, starting_points
 from flexpara.bake.maps.rays import BATCH, RayScene, RaySettings, cosine_directions, pattern_of, sphere_patterns
 from flexpara.bake.maps.tangents import vertex_tangents
+from flexpara.bake.raster.context import open_context
+from flexpara.bake.raster.gbuffer import rasterize
 from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.io.meshwrite import write_ply
@@ -109,10 +110,16 @@ def bare_embreex(surface: Surface, rays: Iterator[tuple[Any, Any]]) -> tuple[int
     return count, seconds
 
 
+def whole_gbuffer(atlas: Atlas, size: int) -> GBuffer:
+    """The G-buffer of the whole image."""
+    with open_context() as context:
+        return rasterize(context, atlas, size)
+
+
 def occlusion_rows(atlas: Atlas, asset: Asset, size: int, count: int, blender: str | None) -> Iterator[Row]:
     """Rays a second.  The image is baked in bands, the bare loop before and after each: other work hits both alike."""
     work = f"AO {size}², {count} rays"
-    scene, whole = RayScene.of(asset.surface), make_gbuffer(atlas, size)
+    scene, whole = RayScene.of(asset.surface), whole_gbuffer(atlas, size)
     bare, own = np.zeros(2), np.zeros(2)
     for rows in np.array_split(np.arange(size), BANDS):
         band = band_of(whole, int(rows[0]), int(rows[-1]) + 1)
@@ -170,7 +177,7 @@ def high_rows(atlas: Atlas, low: Asset, high: Asset, size: int, cage: float, ble
     work = f"normals {len(high.faces)} → {len(low.faces)} faces, {size}²"
     start = time.perf_counter()
     source = HighSource([high], CageSettings(cage))
-    texture = bake(atlas, low, [source.map(find_map("normal"))], size=size)["normal"]
+    texture = bake(atlas, low, [source.find_map("normal")], size=size)["normal"]
     with tempfile.TemporaryDirectory() as folder:
         write_texture(texture, Path(folder) / "normal.png")
     seconds = time.perf_counter() - start

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset
-    from .images import Texture
+    from ..texture import Texture
 
 Compression = Literal["none", "rle", "zip", "zips", "piz", "pxr24", "dwaa", "dwab"]
 COMPRESSIONS: tuple[Compression, ...] = ("none", "rle", "zip", "zips", "piz", "pxr24", "dwaa", "dwab")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
-    from .images import Texture
+    from ..texture import Texture
 
 FLOAT32_LOSS = 1e-6
 """Rounding, as a part of the bounding box's diagonal, from which on positions are written about their centre."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ...runtime.material import AlphaMode
     from ...runtime.mesh import Asset
-    from .images import Texture
+    from ..texture import Texture
 
 BASE_COLOR_MAPS = ("base-color", "vertex-color", "uv-checker", "chart")
 """The first of these that was baked becomes the base colour."""

@@ -1,14 +1,7 @@
 """Image files: float pixels → encoded integers or floats → PNG and EXR, and back for checks.
 
-h w texels, row 0 = top, c channels (1, 3 or 4).  In memory colour is linear light; only PNG holds sRGB.
+h w texels, row 0 = top, c channels (1, 3 or 4).  In memory colour is linear light; only PNG holds sRGB (texture.py).
 PNG carries no colour chunk (glTF ignores them, other readers disagree about them).  Same pixels, same bytes.
-
-| encoding | values in memory | in PNG | in EXR |
-|---|---|---|---|
-| srgb | linear light in [0, 1], a fourth channel is alpha, straight | sRGB curve, alpha as it is | linear |
-| unit | [0, 1] | as it is | as it is |
-| signed | [−1, 1] | (value + 1) / 2 | as it is |
-| linear | any real number | refused | as it is |
 """
 
 from __future__ import annotations
@@ -16,9 +9,8 @@ from __future__ import annotations
 import os
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,9 +27,8 @@ except ImportError as error:
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-Encoding = Literal["srgb", "unit", "signed", "linear"]
-Bits = Literal[8, 16, 32]
-FileType = Literal["png", "exr"]
+    from ..texture import Bits, Encoding, Texture
+
 
 PNG_LEVEL, PNG_FILTER = 2, 0x10
 """zlib's level and libpng's filter SUB alone: a third of the time of its own choice, files 3 % larger."""
@@ -54,23 +45,6 @@ STRAIGHT_ALPHA = "oiio:UnassociatedAlpha"
 
 class EncodingError(InputError):
     """The pixels cannot be written this way."""
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """A baked image, not encoded yet.
-
-    pixels: (h, w, c) float32, meaning by `encoding` (see the table above).  bits: per channel in the file, 32 for EXR
-    only. file_type: how it is written unless asked otherwise.  dither: whether 8-bit files are dithered.
-    metadata: texts for the EXR header, such as units.
-    """
-
-    pixels: NDArray[np.float32]
-    encoding: Encoding
-    bits: Bits
-    file_type: FileType
-    dither: bool = False
-    metadata: dict[str, str] = field(default_factory=dict)
 
 
 def write_texture(texture: Texture, path: Path) -> None:

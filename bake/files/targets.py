@@ -23,14 +23,15 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...runtime.errors import InputError
-from .images import Texture, write_texture
+from ..texture import Texture
+from .images import write_texture
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from ..maps.normals import NormalFormat
-    from .images import Bits
+    from ..bakemap import NormalFormat
+    from ..texture import Bits
 
 Part = Literal["occlusion", "roughness", "metallic", "smoothness", "zero"]
 FINISH_MAPS = ("orm", "metallic-roughness", "occlusion", "ao")

@@ -13,25 +13,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
-from ..maps.normals import object_normal_map
-from ..maps.raymaps import bent_normal_object_map, in_tangent_space
+from ..bakemap import BakeMap
+from ..maps.catalogue import HEIGHT, find_map
+from ..maps.normals import in_tangent_space, object_normal_map
+from ..maps.occlusion import bent_normal_object_map
 from ..maps.rays import RaySettings
 from .highpoly import Projector
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
-    from ..maps.maps import BakeMap
-    from ..maps.normals import NormalFormat
+    from ..bakemap import Compute, NormalFormat
     from ..maps.rays import Progress
     from ..raster.gbuffer import GBuffer
     from .cage import CageSettings
     from .highpoly import HighSurface
-
-    Compute = Callable[[GBuffer, Atlas, Asset], NDArray[np.float32]]
 
 OWN = ("chart", "uv-checker", "face-id", "distortion")
 """Maps that describe the low-poly mesh."""
@@ -58,17 +57,18 @@ class HighSource:
         """The high-poly surface under a G-buffer of the low-poly atlas.  Raises as `bake_from_high`."""
         return self._found(gbuffer, atlas, asset)
 
-    def map(
-        self, entry: BakeMap, *, normal_format: NormalFormat = "opengl", rays: RaySettings | None = None
+    def find_map(
+        self, name: str, *, normal_format: NormalFormat = "opengl", rays: RaySettings | None = None
     ) -> BakeMap:
-        """The map as baked from the high-poly meshes; the map itself where it describes the low-poly mesh.
+        """The map of that name as baked from the high-poly meshes; that of the low-poly mesh where it describes it.
 
-        entry: as `find_map` gives it.  normal_format, rays: as that was asked for.
+        Arguments and errors as `catalogue.find_map`; height is known here too.
         """
-        if entry.name in OWN:
+        if name == HEIGHT:
+            return BakeMap(HEIGHT, "ray", "source units", "any", "linear", "exr", 32, self._height, (0.0, 0.0, 0.0))
+        entry = find_map(name, normal_format=normal_format, rays=rays)
+        if name in OWN:
             return entry
-        if entry.name == "height":
-            return replace(entry, compute=self._height)
         vectors = {
             "normal": object_normal_map(),
             "bent-normal": bent_normal_object_map(rays or RaySettings()),

@@ -18,6 +18,9 @@ from ..pictures.glyphs import COLUMNS, ROWS, text_mask
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...runtime.mesh import Asset, Atlas
+    from ..raster.gbuffer import GBuffer
+
 CELLS = 16
 DOTS = 32
 """Dots per cell side of the drawing of labels."""
@@ -37,6 +40,15 @@ def uv_card(size: int) -> NDArray[np.float32]:
     ink = _ink()[dot_column[:, None], dot_column[None, :]]
     tone[ink] = 4
     return _palette()[tone, row[:, None], column[None, :]]
+
+
+def uv_checker_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+    """The test card of checker.py over the whole image.
+
+    Space uv, linear light in [0, 1]; srgb, PNG 8 bits by default (3 channels).
+    """
+    del atlas, asset
+    return uv_card(gbuffer.shape[0])
 
 
 def _palette() -> NDArray[np.float32]:

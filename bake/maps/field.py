@@ -22,14 +22,14 @@ from onnxruntime.capi.onnxruntime_pybind11_state import (
 from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNotImplemented
 
 from ...runtime.errors import InputError, MissingFileError, ShapeError
-from .maps import BakeMap
+from ..bakemap import BakeMap
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
-    from ..files.images import Encoding
     from ..raster.gbuffer import GBuffer
+    from ..texture import Encoding
 
 MAX_BYTES = 1 << 30
 CHUNK = 16_384

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ...runtime.material import Slot
     from ...runtime.mesh import Asset, Atlas
+    from ..bakemap import Compute
     from ..raster.gbuffer import GBuffer
     from .resample import Decoding
 
@@ -44,7 +45,6 @@ BARE = Material(alpha_mode="BLEND")
 """Of a surface without materials: the alpha of its vertex colours counts."""
 
 Shade = Callable[[Material, "NDArray[np.float32] | None", "NDArray[np.int64]"], "NDArray[np.float32]"]
-Compute = Callable[["GBuffer", "Atlas", "Asset"], "NDArray[np.float32]"]
 
 
 class SourceSlot:
@@ -178,6 +178,21 @@ def occlusion_map() -> Compute:
             return 1.0 + np.float32(material.occlusion_strength) * (values[:, :1] - 1.0)
 
         return ready(atlas, asset, "occlusion", gbuffer.side).shaded(gbuffer, 1, shade)
+
+    return compute
+
+
+def orm_map() -> Compute:
+    """Red the source's occlusion, green roughness, blue metalness, as glTF, Unreal and Godot pack them.
+
+    No space, [0, 1]; unit, PNG 8 bits by default (3 channels).
+    """
+    finish, occlusion = metallic_roughness_map(), occlusion_map()
+
+    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+        packed = finish(gbuffer, atlas, asset)
+        packed[..., 0] = occlusion(gbuffer, atlas, asset)[..., 0]
+        return packed
 
     return compute
 

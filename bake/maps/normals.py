@@ -7,12 +7,12 @@ normal textures of its materials where it has any.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .material import has_normal_texture, textured_normals
-from .tangents import vertex_tangents
+from .tangents import vertex_frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,12 +20,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from ..bakemap import Compute, NormalFormat
     from ..raster.gbuffer import GBuffer
 
-    Compute = Callable[[GBuffer, Atlas, Asset], NDArray[np.float32]]
     NormalSource = Callable[[GBuffer, Atlas, Asset, NDArray[np.int64]], NDArray[np.float32]]
 
-NormalFormat = Literal["opengl", "directx"]
 FLAT = (0.0, 0.0, 1.0)
 
 
@@ -49,13 +48,10 @@ def tangent_normal_map(normal_format: NormalFormat) -> Compute:
     Tangent space, unit vectors, [−1, 1] with z > 0 facing out, (0, 0, 1) = flat; green up (+Y, opengl: glTF, Unity,
     Godot, Blender) or down (−Y, directx: Unreal); signed, PNG 8 bits dithered by default (3 channels).
     The frame is interpolated, not normalised, and inverted exactly, as MikkTSpace asks.  So where the atlas' normals
-    are the source's own and no material has a normal texture, the map is flat without more ado.
+    are the source's own and no material has a normal texture, the map is flat, and nothing is computed.
     """
     normals = detail_normals()
-
-    @lru_cache(maxsize=1)
-    def frames(atlas: Atlas) -> NDArray[np.float32]:
-        return np.column_stack([atlas.normals, vertex_tangents(atlas)])
+    frames = lru_cache(maxsize=1)(vertex_frames)
 
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
         height, width = gbuffer.shape
@@ -68,6 +64,23 @@ def tangent_normal_map(normal_format: NormalFormat) -> Compute:
         if normal_format == "directx":
             result[:, 1] *= -1.0
         return result.reshape(height, width, 3)
+
+    return compute
+
+
+def in_tangent_space(vectors: Compute, normal_format: NormalFormat) -> Compute:
+    """A map of object-space vectors (h, w, 3) as one in the frame of the tangents that are written; green by format."""
+    frames = lru_cache(maxsize=1)(vertex_frames)
+
+    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+        flat = vectors(gbuffer, atlas, asset).reshape(-1, 3)
+        result = np.zeros_like(flat)
+        for texels in gbuffer.chunks():
+            frame = gbuffer.interpolate(frames(atlas), atlas.faces, texels)
+            result[texels] = to_tangent_space(flat[texels], frame)
+        if normal_format == "directx":
+            result[:, 1] *= -1.0
+        return result.reshape(*gbuffer.shape, 3)
 
     return compute
 

@@ -1,6 +1,7 @@
 """Maps of what rays see from the surface: ambient occlusion, bent normals, thickness.
 
-h w texels · t texels of a batch · s rays per texel.  Object space; rays run in the unit ball of the mesh's Frame.
+h w texels, row 0 = top · t texels of a batch · s rays per texel.  A scene of rays is built once per mesh and kept for
+the windows of an image.  Object space; rays run in the unit ball of the mesh's Frame.
 
 Where a ray starts: at the surface point, lifted onto the smooth surface that the vertex normals describe (Hanika 2021,
 "Hacking the Shadow Terminator"), so that coarse faces cast no shadow on themselves; then `OFFSET` along the face
@@ -9,12 +10,14 @@ normal, so that rays do not hit the face they start from.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.geometry.triangles import triangle_cross
 from ...runtime.mesh import Frame
+from .normals import in_tangent_space
 from .rays import BATCH, RayScene, RaySettings, cosine_directions, in_batches, pattern_of, sphere_patterns
 
 if TYPE_CHECKING:
@@ -23,12 +26,42 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from ..bakemap import Compute, NormalFormat
     from ..raster.gbuffer import GBuffer
 
     Kernel = Callable[[RayScene, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]], NDArray[np.float32]]
 
 OFFSET = 3e-5
 """Start of rays off the face, in radii of the mesh: some hundred steps of float32."""
+
+
+def ao_map(settings: RaySettings) -> Compute:
+    """Ambient occlusion: the cosine-weighted part of the hemisphere that is open, see `ambient_occlusion`.
+
+    No space, [0, 1], 1 = open; unit, PNG 8 bits dithered by default (1 channel).
+    """
+    return _with_scene(ambient_occlusion, settings)
+
+
+def bent_normal_object_map(settings: RaySettings) -> Compute:
+    """Mean open direction, see `bent_normals`.  Object space, unit vectors, [−1, 1]; signed, EXR half (3 channels)."""
+    return _with_scene(bent_normals, settings)
+
+
+def bent_normal_map(settings: RaySettings, normal_format: NormalFormat) -> Compute:
+    """Mean open direction in the frame of the tangents that are written, as the normal map's.
+
+    Tangent space, unit vectors, [−1, 1]; signed, PNG 8 bits dithered by default (3 channels).
+    """
+    return in_tangent_space(bent_normal_object_map(settings), normal_format)
+
+
+def thickness_map(settings: RaySettings) -> Compute:
+    """Depth of the body beneath the surface in radii of the mesh's bounding ball, see `thickness`.
+
+    No space, [0, 1]; unit, PNG 8 bits dithered by default (1 channel).
+    """
+    return _with_scene(thickness, settings)
 
 
 def ambient_occlusion(
@@ -130,6 +163,16 @@ def lift(
     """
     below = np.einsum("tci,tci->tc", corner - point[:, None], normal)
     return np.einsum("tc,tci->ti", weights * np.maximum(below, 0.0), normal)
+
+
+def _with_scene(function: Callable[..., NDArray[np.float32]], settings: RaySettings) -> Compute:
+    """The function with its settings, and a scene that is kept while the surface stays the same."""
+    scene_of = lru_cache(maxsize=1)(RayScene.of)
+
+    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+        return function(gbuffer, atlas, asset, settings, scene=scene_of(asset.surface))
+
+    return compute
 
 
 def _gather(

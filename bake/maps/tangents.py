@@ -56,6 +56,11 @@ def vertex_tangents(atlas: Atlas) -> NDArray[np.float32]:
     return completed(result, np.asarray(atlas.normals, np.float64)).astype(np.float32)
 
 
+def vertex_frames(atlas: Atlas) -> NDArray[np.float32]:
+    """(n, 7) float32: normal, tangent and w of each atlas vertex, as they are written and normal maps are read by."""
+    return np.column_stack([atlas.normals, vertex_tangents(atlas)])
+
+
 def mikk_tangents(
     positions: NDArray[np.floating], normals: NDArray[np.floating], uv: NDArray[np.floating], faces: NDArray[np.int64]
 ) -> NDArray[np.float32]:

@@ -13,8 +13,9 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ..color import chart_colors, linear_from_srgb
-from ..files.images import Texture, write_png
+from ..files.images import write_png
 from ..raster.context import open_context
+from ..texture import Texture
 from .canvas import Camera, Lines, draw, three_quarter_axes
 from .glyphs import ADVANCE, ROWS, text_mask
 from .preview import INK, PAPER, checker_cells, layout, seam_segments, solid

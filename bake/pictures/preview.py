@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import ShapeError
-from ...runtime.geometry.triangles import signed_areas, triangle_areas
-from ..color import chart_colors, linear_from_oklab, linear_from_srgb
-from ..files.images import Texture, write_png
+from ..color import chart_colors, linear_from_srgb
+from ..files.images import write_png
+from ..heat import distortion_scale, face_areas, heat_colors, signed_distortion
 from ..raster.context import open_context
 from ..raster.layout import border_edges
+from ..texture import Texture
 from .canvas import Camera, Lines, Shape, draw, three_quarter_axes
 from .glyphs import ROWS, text_mask
 
@@ -36,11 +37,6 @@ SHEET = (0.99, 0.99, 0.99)
 INK = (0.02, 0.022, 0.03)
 CHECKS = 26.0
 """Checker squares along the bounding box's diagonal."""
-SCALES = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 100.0)
-"""Upper ends of the distortion scale; the first that holds 98 % of the faces is taken."""
-
-HEAT = np.array([[0.42, -0.03, -0.17], [0.68, -0.05, -0.10], [0.95, 0, 0], [0.70, 0.11, 0.06], [0.46, 0.17, 0.08]])
-"""Oklab colours at −1, −½, 0, ½, 1 of the distortion scale."""
 
 
 def render_preview(atlas: Atlas, face_distortion: NDArray[np.float64], path: Path) -> None:
@@ -107,30 +103,10 @@ def seam_segments(atlas: Atlas, points: NDArray[np.floating]) -> NDArray[np.floa
 
 def checker_cells(atlas: Atlas) -> float:
     """Checker squares per uv unit that make about `CHECKS` along the bounding box's diagonal."""
-    surface, flat = _areas(atlas)
+    surface, flat = face_areas(atlas)
     diagonal = float(np.linalg.norm(np.ptp(atlas.positions, axis=0)))
     density = np.sqrt(max(float(surface.sum()), 1e-300) / max(float(flat.sum()), 1e-300))
     return max(round(CHECKS * density / diagonal), 1) if diagonal > 0.0 else 1.0
-
-
-def distortion_scale(face_distortion: NDArray[np.float64]) -> float:
-    """Upper end of the colour scale: the first of `SCALES` that 98 % of the faces do not exceed."""
-    reach = float(np.quantile(np.minimum(face_distortion, SCALES[-1]), 0.98))
-    return next((scale for scale in SCALES if scale >= reach), SCALES[-1])
-
-
-def signed_distortion(atlas: Atlas, face_distortion: NDArray[np.float64], top: float) -> NDArray[np.float64]:
-    """(f,) in [−1, 1]: 0 = isometric, ±1 = distortion `top` or more; negative where uv is smaller than its share."""
-    surface, flat = _areas(atlas)
-    sign = np.where(flat * surface.sum() < surface * flat.sum(), -1.0, 1.0)
-    excess = np.nan_to_num(face_distortion, nan=top, posinf=top) - 1.0
-    return sign * np.clip(excess / (top - 1.0), 0.0, 1.0)
-
-
-def heat_colors(value: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(m,) in [−1, 1] → (m, 3) float32 linear light: blue, near white, red, even steps in Oklab."""
-    lab = np.stack([np.interp(value, (-1.0, -0.5, 0.0, 0.5, 1.0), channel) for channel in HEAT.T], axis=-1)
-    return np.clip(linear_from_oklab(lab), 0.0, 1.0).astype(np.float32)
 
 
 def caption(text: str) -> NDArray[np.float32]:
@@ -157,8 +133,3 @@ def write_text(picture: NDArray[np.float32], text: str, middle: int, top: int) -
     mask = text_mask(text, scale=2)
     left = middle - mask.shape[1] // 2
     picture[top : top + 2 * ROWS, left : left + mask.shape[1]][mask] = linear_from_srgb(np.full(3, 0.30))
-
-
-def _areas(atlas: Atlas) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Area of each face on the surface and in uv, (f,) float64 each, not negative."""
-    return triangle_areas(atlas.positions[atlas.faces]), np.abs(signed_areas(atlas.corner_uv))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.raster.context import open_context
+from flexpara.bake.raster.gbuffer import GBuffer, rasterize
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 Pair = tuple[Atlas, Asset]
@@ -38,6 +39,17 @@ def context() -> Iterator[moderngl.Context]:
         yield context
         assert context.error == "GL_NO_ERROR"
         assert leaked_objects(context) == []
+
+
+@pytest.fixture
+def make_gbuffer() -> Callable[[Atlas, int], GBuffer]:
+    """Rasterizes an atlas at a size, in a context of its own."""
+
+    def make(atlas: Atlas, size: int) -> GBuffer:
+        with open_context() as context:
+            return rasterize(context, atlas, size)
+
+    return make
 
 
 def make_pair(positions: Any, faces: Any, uv: Any, **changes: Any) -> Pair:

@@ -12,14 +12,18 @@ import moderngl
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import bake, make_gbuffer, texture_names, write_textures
+from flexpara.bake.bakemap import BakeMap
+from flexpara.bake.baker import bake
 from flexpara.bake.files.images import read_image
-from flexpara.bake.maps.maps import BakeMap, find_map
+from flexpara.bake.files.textures import texture_names, write_textures
+from flexpara.bake.maps.catalogue import find_map
 from flexpara.bake.raster.context import open_context
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.bake.raster.tiles import SoftwareWarning
+from flexpara.bake.raster.plan import SoftwareWarning
 from flexpara.runtime.errors import InputError, MissingDependencyError
 from flexpara.runtime.mesh import Asset, Atlas
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 Pair = tuple[Atlas, Asset]
 
@@ -52,7 +56,7 @@ def test_position_of_the_unit_quad_is_exact_to_1e_5(quad: Pair) -> None:
 
 
 def test_no_maps_need_no_context(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.raster.plan.open_context", lambda: pytest.fail("opened a context"))
     assert bake(*quad, []) == {}
 
 
@@ -105,7 +109,7 @@ def test_a_function_of_the_wrong_shape_is_named(quad: Pair) -> None:
         bake(*quad, [custom(np.zeros((3, 3, 1)))])
 
 
-def test_a_function_of_the_surface_needs_no_asset(two_charts: Pair) -> None:
+def test_a_function_of_the_surface_needs_no_asset(make_gbuffer: MakeGBuffer, two_charts: Pair) -> None:
     calls: list[tuple[tuple[int, ...], ...]] = []
 
     def height_and_face(position: np.ndarray, normal: np.ndarray, face: np.ndarray) -> np.ndarray:
@@ -155,7 +159,7 @@ def test_a_bake_leaves_neither_errors_nor_objects_on_the_device(
             assert context.error == "GL_NO_ERROR"
             assert leaks(context) == []
 
-    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", watched)
+    monkeypatch.setattr("flexpara.bake.raster.plan.open_context", watched)
     bake(*sphere, ["position", "normal", "face-id"], size=50, padding=2, samples=4, limit=40)
     with pytest.raises(InputError, match="uv span"):
         bake(replace(sphere[0], uv=sphere[0].uv * 3), sphere[1], ["position"], size=50)
@@ -175,7 +179,7 @@ def test_tiles_change_no_bit_of_any_map(sphere: Pair, limit: int, samples: int) 
         assert whole[name].pixels.tobytes() == tiled[name].pixels.tobytes(), name
 
 
-def test_the_software_rasterizer_bakes_the_same(sphere: Pair) -> None:
+def test_the_software_rasterizer_bakes_the_same(make_gbuffer: MakeGBuffer, sphere: Pair) -> None:
     names = ["position", "chart", "face-id"]
     first, second = (bake(*sphere, names, size=64, padding=3, device=device) for device in ("opengl", "software"))
     np.testing.assert_array_equal(first["face-id"].pixels, second["face-id"].pixels)
@@ -190,7 +194,7 @@ def test_without_opengl_numpy_draws_and_says_so(quad: Pair, monkeypatch: pytest.
     def absent() -> None:
         raise MissingDependencyError("no OpenGL 3.3 context could be made: apt-get install libegl1")
 
-    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", absent)
+    monkeypatch.setattr("flexpara.bake.raster.plan.open_context", absent)
     said: list[str] = []
     expected = bake(*quad, ["position"], size=16, device="software")["position"].pixels
     np.testing.assert_array_equal(bake(*quad, ["position"], size=16, warn=said.append)["position"].pixels, expected)
@@ -257,7 +261,7 @@ def test_a_size_that_cannot_be_drawn_is_refused(quad: Pair, size: int, text: str
 
 
 def test_an_unknown_map_is_refused_before_any_work(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.bake.raster.tiles.open_context", lambda: pytest.fail("opened a context"))
+    monkeypatch.setattr("flexpara.bake.raster.plan.open_context", lambda: pytest.fail("opened a context"))
     with pytest.raises(InputError, match="unknown map 'nope'"):
         bake(*quad, ["position", "nope"])
 

@@ -34,7 +34,12 @@ def imported_without(package: str, module: str) -> str:
 
 @pytest.mark.parametrize(
     ("package", "module"),
-    [("moderngl", "baker"), ("OpenImageIO", "baker"), ("pygltflib", "files.gltf"), ("moderngl", "pictures.preview")],
+    [
+        ("moderngl", "baker"),
+        ("OpenImageIO", "files.images"),
+        ("pygltflib", "files.gltf"),
+        ("moderngl", "pictures.preview"),
+    ],
 )
 def test_a_missing_package_is_named_with_its_remedy(package: str, module: str) -> None:
     message = imported_without(package, module)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import bake, make_gbuffer
+from flexpara.bake.baker import bake
 from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.pictures.preview import preview_pixels
+from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.runtime.geometry.metrics import face_distortion
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.pack.packing import atlas_from_uv
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 Pair = tuple[Atlas, Asset]
 
@@ -29,7 +33,7 @@ def spot(models: Path) -> Pair:
     return atlas_from_uv(asset), asset
 
 
-def test_every_texel_lies_on_the_face_it_names(spot: Pair) -> None:
+def test_every_texel_lies_on_the_face_it_names(make_gbuffer: MakeGBuffer, spot: Pair) -> None:
     atlas, _ = spot
     buffer = make_gbuffer(atlas, 512)
     texels = buffer.texels
@@ -46,7 +50,7 @@ def test_every_texel_lies_on_the_face_it_names(spot: Pair) -> None:
     assert np.quantile(away, 0.9) < 1e-2
 
 
-def test_a_texture_resampled_onto_its_own_uv_is_itself(spot: Pair) -> None:
+def test_a_texture_resampled_onto_its_own_uv_is_itself(make_gbuffer: MakeGBuffer, spot: Pair) -> None:
     atlas, asset = spot
     image = np.random.default_rng(0).integers(0, 256, (256, 256, 4)).astype(np.uint8)
     image[..., 3] = 255

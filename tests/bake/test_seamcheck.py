@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import bake, chart_labels, make_gbuffer
-from flexpara.bake.files.images import Texture
+from flexpara.bake.baker import bake, chart_labels
+from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.bake.seamcheck import (
     agrees_across_seams,
     bleed_free_mip,
@@ -20,9 +20,12 @@ from flexpara.bake.seamcheck import (
     seam_error,
     seam_report,
 )
+from flexpara.bake.texture import Texture
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.pack.packing import atlas_from_uv
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 Pair = tuple[Atlas, Asset]
 
@@ -68,7 +71,7 @@ def test_the_error_of_two_constants_is_their_difference(cut: Pair) -> None:
     assert seam_error(texture, sample_seams(np.zeros((0, 2, 2, 2)), 64)) is None
 
 
-def test_a_steep_function_agrees_across_the_seam_and_stays_inside_charts(cut: Pair) -> None:
+def test_a_steep_function_agrees_across_the_seam_and_stays_inside_charts(make_gbuffer: MakeGBuffer, cut: Pair) -> None:
     def steep(position: np.ndarray, *_: np.ndarray) -> np.ndarray:
         return 0.5 + 0.5 * np.sin(6.0 * position[:, :2])
 

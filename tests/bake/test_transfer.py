@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -10,14 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import bake, make_gbuffer
+from flexpara.bake.baker import bake
 from flexpara.bake.color import srgb_exact
 from flexpara.bake.files.images import quantize
 from flexpara.bake.maps.material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
 from flexpara.bake.maps.normals import object_normal_map
 from flexpara.bake.maps.tangents import split_by_tangents
+from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 
 def _sibling(name: str) -> Any:
@@ -51,7 +55,7 @@ def on_faces(asset: Asset, screen: Atlas, atlas: Atlas) -> Asset:
     return replace(asset, faces=asset.faces[shown], face_material=asset.face_material[shown])
 
 
-def renders(atlas: Atlas, asset: Asset, pixels: int) -> dict[str, np.ndarray]:
+def renders(make_gbuffer: MakeGBuffer, atlas: Atlas, asset: Asset, pixels: int) -> dict[str, np.ndarray]:
     """Name → (t, c) values in [0, 1] of the covered pixels, as a display shows them."""
     screen = seen_from_above(atlas)
     shown = on_faces(asset, screen, atlas)
@@ -99,7 +103,9 @@ def psnr(first: np.ndarray, second: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("wrap", [("repeat", "repeat"), ("mirror", "clamp")])
-def test_the_renders_before_and_after_agree(monkeypatch: pytest.MonkeyPatch, wrap: Any) -> None:
+def test_the_renders_before_and_after_agree(
+    make_gbuffer: MakeGBuffer, monkeypatch: pytest.MonkeyPatch, wrap: Any
+) -> None:
     """At twice the texels: the old picture of 256² lies twice around the torus, the new one has 1024²."""
     material = textured.rich_material(SIZE, wrap=wrap, emissive=(1.0, 1.0, 1.0))
     asset = textured.torus_asset(material)
@@ -107,6 +113,6 @@ def test_the_renders_before_and_after_agree(monkeypatch: pytest.MonkeyPatch, wra
     after = rebaked(atlas, asset, 4 * SIZE)
     own = replace(atlas, source_vertex=np.arange(len(atlas.positions)))
     monkeypatch.setattr("flexpara.bake.maps.resample.SHARPEN", 0.0)  # what looks at the textures filters bilinearly
-    old, new = renders(atlas, asset, 512), renders(own, after, 512)
+    old, new = renders(make_gbuffer, atlas, asset, 512), renders(make_gbuffer, own, after, 512)
     found = {name: psnr(old[name], new[name]) for name in old}
     assert min(found.values()) >= BAR, found

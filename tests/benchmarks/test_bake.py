@@ -11,7 +11,8 @@ import pytest
 from benchmarks import bake
 from flexpara.bake.maps.normals import to_tangent_space
 from flexpara.bake.maps.rays import RayScene
-from flexpara.bake.raster.gbuffer import GBuffer, Planes
+from flexpara.bake.raster.gbuffer import GBuffer
+from flexpara.bake.raster.layout import Planes
 from flexpara.runtime.mesh import Frame, Surface
 
 

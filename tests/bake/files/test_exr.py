@@ -10,7 +10,8 @@ import pytest
 
 from flexpara.bake.baker import bake
 from flexpara.bake.files.exr import ExrSettings, file_metadata, write_layers
-from flexpara.bake.files.images import EncodingError, Texture, oiio
+from flexpara.bake.files.images import EncodingError, oiio
+from flexpara.bake.texture import Texture
 from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]

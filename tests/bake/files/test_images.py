@@ -9,10 +9,7 @@ import pytest
 
 from flexpara.bake.color import byte_to_linear, srgb_exact
 from flexpara.bake.files.images import (
-    Bits,
-    Encoding,
     EncodingError,
-    Texture,
     bayer_threshold,
     encode_png,
     quantize,
@@ -21,6 +18,7 @@ from flexpara.bake.files.images import (
     write_png,
     write_texture,
 )
+from flexpara.bake.texture import Bits, Encoding, Texture
 from flexpara.runtime.errors import InputError
 
 

@@ -15,8 +15,9 @@ from PIL import Image
 from flexpara.bake.baker import bake
 from flexpara.bake.files.exr import write_layers
 from flexpara.bake.files.gltf import write_glb
-from flexpara.bake.files.images import Texture, read_image
+from flexpara.bake.files.images import read_image
 from flexpara.bake.files.targets import TARGETS, find_target, packed_textures, prepare, with_green, write_target
+from flexpara.bake.texture import Texture
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas

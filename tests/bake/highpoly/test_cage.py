@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import make_gbuffer
 from flexpara.bake.highpoly.cage import Cage, CageSettings, check_cage
+from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas, Frame, Surface
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 Pair = tuple[Atlas, Asset]
 UNIT = Frame((0.0, 0.0, 0.0), 1.0)
@@ -24,7 +26,7 @@ def test_a_distance_out_of_range_is_refused(distance: float) -> None:
         CageSettings(distance)
 
 
-def test_rays_reach_a_part_of_the_diagonal_both_ways(quad: Pair) -> None:
+def test_rays_reach_a_part_of_the_diagonal_both_ways(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 8)
     frame = Frame((0.0, 0.0, 0.0), 2.0)
@@ -35,7 +37,7 @@ def test_rays_reach_a_part_of_the_diagonal_both_ways(quad: Pair) -> None:
     np.testing.assert_allclose(rays.outwards, np.tile([0, 0, 1], (64, 1)), atol=1e-7)
 
 
-def test_directions_are_smooth_across_a_hard_edge(pair: Callable[..., Pair]) -> None:
+def test_directions_are_smooth_across_a_hard_edge(make_gbuffer: MakeGBuffer, pair: Callable[..., Pair]) -> None:
     """The atlas is split along the ridge and has flat normals; rays on both sides of it still run the same way."""
     faces = np.array([[0, 1, 2], [4, 3, 5]])
     source = np.array([0, 1, 2, 0, 1, 3])
@@ -50,7 +52,7 @@ def test_directions_are_smooth_across_a_hard_edge(pair: Callable[..., Pair]) -> 
     np.testing.assert_allclose(np.linalg.norm(rays.outwards, axis=1), 1, atol=1e-6)
 
 
-def test_a_cage_mesh_says_where_rays_start(quad: Pair) -> None:
+def test_a_cage_mesh_says_where_rays_start(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 8)
     lifted = replace(asset.surface, vertices=asset.surface.vertices + np.array([0.3, 0, 0.4]))
@@ -61,7 +63,7 @@ def test_a_cage_mesh_says_where_rays_start(quad: Pair) -> None:
     np.testing.assert_allclose(rays.back, 0.5, atol=1e-6)
 
 
-def test_a_cage_that_touches_takes_the_normal(quad: Pair) -> None:
+def test_a_cage_that_touches_takes_the_normal(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 8)
     rays = Cage.of(asset.surface, UNIT, CageSettings(cage=asset)).rays(buffer, buffer.texels)

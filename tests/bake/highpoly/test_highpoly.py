@@ -9,17 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexpara.bake.baker import make_gbuffer
 from flexpara.bake.highpoly.cage import CageSettings, Rays
 from flexpara.bake.highpoly.highmesh import atlas_of, merge_assets, uv_per_unit
 from flexpara.bake.highpoly.highpoly import bake_from_high, first_front
 from flexpara.bake.maps.rays import RayScene
+from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.material import Material
 from flexpara.runtime.mesh import Asset, Atlas, Frame, Surface
 from flexpara.runtime.pack.packing import atlas_from_uv
 from flexpara.runtime.samples import make_sample
+
+MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 Pair = tuple[Atlas, Asset]
 
@@ -39,7 +41,7 @@ def down_rays(points: list[list[float]], front: float, back: float) -> Rays:
 
 
 @pytest.mark.parametrize("height", [-0.1, 0.0, 0.1])
-def test_a_plane_above_or_below_is_found_where_it_is(quad: Pair, height: float) -> None:
+def test_a_plane_above_or_below_is_found_where_it_is(make_gbuffer: MakeGBuffer, quad: Pair, height: float) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 16)
     found = bake_from_high(buffer, atlas, asset, [plane(height)], CageSettings(0.1))
@@ -50,7 +52,7 @@ def test_a_plane_above_or_below_is_found_where_it_is(quad: Pair, height: float) 
     assert found.report()["missed"] == 0
 
 
-def test_the_outermost_front_is_taken(quad: Pair) -> None:
+def test_the_outermost_front_is_taken(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     """Of details that float above the surface, what lies on top."""
     atlas, asset = quad
     highs = [plane(0.0), plane(0.05), plane(0.5)]
@@ -59,7 +61,7 @@ def test_the_outermost_front_is_taken(quad: Pair) -> None:
     assert set(found.gbuffer.face.reshape(-1)) <= {2, 3}  # those of the second mesh
 
 
-def test_backs_are_passed_unless_they_count(quad: Pair) -> None:
+def test_backs_are_passed_unless_they_count(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 8)
     highs = [plane(0.08, up=False), plane(0.05, up=False), plane(-0.02)]
@@ -85,7 +87,7 @@ def test_rays_end_at_their_reach() -> None:
     assert first_front(beyond, down_rays([[0.5, 0.5, 0]], 0.1, 0.5)).hit.tolist() == [False]
 
 
-def test_missed_texels_take_the_nearest_point_and_are_counted(quad: Pair) -> None:
+def test_missed_texels_take_the_nearest_point_and_are_counted(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     """The high-poly plane ends at x = ½: texels beyond it take its border."""
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 16)
@@ -100,7 +102,7 @@ def test_missed_texels_take_the_nearest_point_and_are_counted(quad: Pair) -> Non
     assert found.report() == {"texels": 256, "missed": 128, "missed_share": 0.5, "highest": 0.0, "lowest": 0.0}
 
 
-def test_texels_without_surface_stay_without(two_charts: Pair) -> None:
+def test_texels_without_surface_stay_without(make_gbuffer: MakeGBuffer, two_charts: Pair) -> None:
     atlas, asset = two_charts
     buffer = make_gbuffer(atlas, 32)
     found = bake_from_high(buffer, atlas, asset, [plane(0.0)], CageSettings(1.0))
@@ -109,7 +111,7 @@ def test_texels_without_surface_stay_without(two_charts: Pair) -> None:
     assert (found.height[buffer.face < 0] == 0).all()
 
 
-def test_a_ball_around_a_coarse_ball(sphere: Pair) -> None:
+def test_a_ball_around_a_coarse_ball(make_gbuffer: MakeGBuffer, sphere: Pair) -> None:
     """Rays along the low-poly's normals meet the sphere of radius 1.05 at that distance from the centre."""
     atlas, asset = sphere
     vertices, faces = make_sample("sphere", resolution=96)
@@ -126,7 +128,7 @@ def test_a_ball_around_a_coarse_ball(sphere: Pair) -> None:
     assert height.max() < 0.08  # 0.05 and the sagitta of the coarse faces
 
 
-def test_parts_see_only_their_partners(two_charts: Pair) -> None:
+def test_parts_see_only_their_partners(make_gbuffer: MakeGBuffer, two_charts: Pair) -> None:
     """Chart 0 at z = 0 and chart 1 at z = 1; each sees the plane of its name, though the other lies nearer."""
     atlas, asset = two_charts
     low = replace(asset, materials=(Material("a_low"), Material("b_low")), face_material=np.array([0, 0, 1, 1]))
@@ -140,7 +142,7 @@ def test_parts_see_only_their_partners(two_charts: Pair) -> None:
         bake_from_high(buffer, atlas, low, highs[:1], CageSettings(1.0, match_names=True))
 
 
-def test_no_high_poly_mesh_is_refused(quad: Pair) -> None:
+def test_no_high_poly_mesh_is_refused(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     with pytest.raises(InputError, match="pass --high"):
         bake_from_high(make_gbuffer(quad[0], 8), *quad, [])
 
@@ -174,7 +176,7 @@ def test_the_atlas_of_a_mesh_has_the_density_asked_for() -> None:
     np.testing.assert_array_equal(atlas_of(plane(0.0), 0.25).uv, 0)
 
 
-def test_a_mesh_baked_onto_itself_finds_itself(models: Path) -> None:
+def test_a_mesh_baked_onto_itself_finds_itself(make_gbuffer: MakeGBuffer, models: Path) -> None:
     """Low-poly and high-poly the same: height 0, the same faces, nothing missed."""
     spot = load_asset(models / "spot.obj")
     assert spot.uv is not None
@@ -204,7 +206,7 @@ def coarse_bunny(models: Path, pair: Callable[..., Pair]) -> tuple[Pair, Asset]:
     return (atlas, replace(asset, surface=Surface(corner, sides.reshape(-1)[faces]))), high
 
 
-def test_a_box_around_bunny_sees_all_of_its_sides(coarse_bunny: tuple[Pair, Asset]) -> None:
+def test_a_box_around_bunny_sees_all_of_its_sides(make_gbuffer: MakeGBuffer, coarse_bunny: tuple[Pair, Asset]) -> None:
     (atlas, asset), high = coarse_bunny
     found = bake_from_high(make_gbuffer(atlas, 192), atlas, asset, [high], CageSettings(0.5))
     texels = found.gbuffer.texels

@@ -1,4 +1,7 @@
-"""Any function of the surface as a map.   t texels of one call · c channels, 1 to 4."""
+"""Functions of the surface point as maps: its position, and whatever a caller passes.
+
+t texels of one call · c channels, 1 to 4.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.mesh import Asset, Surface
-from .maps import BakeMap
+from ..bakemap import BakeMap
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -19,6 +22,12 @@ if TYPE_CHECKING:
 
 SurfaceFunction = Callable[["NDArray[np.float32]", "NDArray[np.float32]", "NDArray[np.int64]"], "ArrayLike"]
 """Positions (t, 3), unit normals (t, 3), face numbers (t,) → (t,) or (t, c)."""
+
+
+def position_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+    """Surface point.  Object space, source units, any range; linear, EXR float by default (3 channels)."""
+    del atlas, asset
+    return np.ascontiguousarray(gbuffer.position)
 
 
 def function_map(name: str, function: SurfaceFunction) -> BakeMap:

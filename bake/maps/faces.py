@@ -1,4 +1,4 @@
-"""Maps that name or measure faces: their number, their material, their distortion; and what is packed of the others.
+"""Maps that name or measure faces: their number, chart, material and distortion.
 
 h w texels, row 0 = top · f faces.  Values are constant on a face, so nothing is interpolated.
 """
@@ -12,17 +12,14 @@ import numpy as np
 
 from ...runtime.geometry.metrics import face_distortion
 from ..color import chart_colors
-from .material import metallic_roughness_map, occlusion_map
+from ..heat import distortion_scale, heat_colors, signed_distortion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from ..bakemap import Compute
     from ..raster.gbuffer import GBuffer
-
-    Compute = Callable[[GBuffer, Atlas, Asset], NDArray[np.float32]]
 
 
 def face_id_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
@@ -44,40 +41,29 @@ def material_id_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.
     return np.take(colors[material], gbuffer.face, axis=0, mode="clip")
 
 
+def chart_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+    """Colour of the chart, distinct for neighbouring numbers.
+
+    No space, linear light in [0, 1]; srgb, PNG 8 bits by default (3 channels).
+    """
+    del asset
+    colors = chart_colors(int(atlas.face_chart.max(initial=0)) + 1)
+    return np.take(colors[atlas.face_chart], gbuffer.face, axis=0, mode="clip")
+
+
 def distortion_map() -> Compute:
     """Heat map of the symmetric Dirichlet energy per face: white = isometric, blue = too small in uv, red = too large.
 
     No space, linear light in [0, 1]; srgb, PNG 8 bits by default (3 channels).  The deepest colour stands for the first
-    of preview.SCALES that 98 % of the faces do not exceed, as in the preview's legend.
+    of heat.SCALES that 98 % of the faces do not exceed, as in the preview's legend.
     """
 
     @lru_cache(maxsize=1)
     def face_colors(atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-        from ..pictures.preview import (  # draws with OpenGL, which maps do not
-            distortion_scale,
-            heat_colors,
-            signed_distortion,
-        )
-
         stretch = face_distortion(asset.surface, atlas.corner_uv)
         return heat_colors(signed_distortion(atlas, stretch, distortion_scale(stretch)))
 
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
         return np.take(face_colors(atlas, asset), gbuffer.face, axis=0, mode="clip")
-
-    return compute
-
-
-def orm_map() -> Compute:
-    """Red the source's occlusion, green roughness, blue metalness, as glTF, Unreal and Godot pack them.
-
-    No space, [0, 1]; unit, PNG 8 bits by default (3 channels).
-    """
-    finish, occlusion = metallic_roughness_map(), occlusion_map()
-
-    def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-        packed = finish(gbuffer, atlas, asset)
-        packed[..., 0] = occlusion(gbuffer, atlas, asset)[..., 0]
-        return packed
 
     return compute

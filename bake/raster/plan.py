@@ -1,6 +1,6 @@
-"""Maps window by window: what is drawn at once is bounded, whatever the size of the image.
+"""How an image is cut into windows, and what draws them: OpenGL, or numpy where there is none.
 
-h w texels · k samples along a texel's side.  The arrays that windows are drawn into are used again for the next window.
+h w texels · k samples along a texel's side.
 """
 
 from __future__ import annotations
@@ -10,22 +10,17 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
-import numpy as np
-
 from ...runtime.errors import InputError, MissingDependencyError
 from .context import max_texture_size, open_context
 from .gbuffer import DeviceRasterizer, GBuffer
 from .layout import Layout, Planes, Window, check_size, windows
 from .software import SoftwareRasterizer
-from .supersample import averaged, covered_texels, first_covered, samples_along
+from .supersample import samples_along
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
-    from ...runtime.mesh import Asset, Atlas
-    from ..maps.maps import BakeMap
+    from ...runtime.mesh import Atlas
 
 Device = Literal["auto", "opengl", "software"]
 DEVICES: tuple[Device, ...] = ("auto", "opengl", "software")
@@ -110,76 +105,6 @@ def open_rasterizer(
                 yield DeviceRasterizer(context, stack, atlas, layout, plan.capacity(pieces)), pieces
                 return
         yield SoftwareRasterizer(atlas, layout), plan.windows(plan.size * plan.along)
-
-
-def map_windows(
-    rasterizer: Rasterizer,
-    pieces: Sequence[Window],
-    plan: Plan,
-    entries: Sequence[BakeMap],
-    atlas: Atlas,
-    asset: Asset,
-    progress: Callable[[str], None] | None = None,
-) -> Iterator[BakedWindow]:
-    """Window by window, every map.  What was yielded is not changed by the next window.
-
-    progress: called with each map's name before it is made the first time.
-    Raises: InputError when a map's function returns another shape than (h, w, 1 to 4).
-    """
-    planes = Planes.of(*plan.capacity(pieces))
-    for number, window in enumerate(pieces):
-        fine = window.scaled(plan.along)
-        gbuffer = rasterizer.draw(fine, planes.shaped(fine.height, fine.width), clear=False)  # the rest is background
-        held = gbuffer.face >= 0
-        covered = covered_texels(held, plan.along) if plan.along > 1 else held
-        maps: dict[str, NDArray[np.float32]] = {}
-        for entry in entries:
-            if progress is not None and number == 0:
-                progress(entry.name)
-            pixels = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
-            kept = any(np.may_share_memory(pixels, plane) for plane in planes)
-            maps[entry.name] = pixels.copy() if kept else pixels
-        inside = gbuffer.inside if plan.along == 1 else ~covered_texels(~gbuffer.inside, plan.along)
-        yield BakedWindow(window, covered, inside, maps)
-
-
-@dataclass(frozen=True, eq=False)
-class BakedWindow:
-    """The maps of a window.
-
-    covered: (h, w) bool, which texels hold a surface.  inside: (h, w) bool, those whose samples all lie in faces.
-    maps: name → (h, w, c) pixels, before gutters.
-    """
-
-    window: Window
-    covered: NDArray[np.bool_]
-    inside: NDArray[np.bool_]
-    maps: dict[str, NDArray[np.float32]]
-
-
-def computed(entry: BakeMap, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-    """(h, w, c) float32 of one map.  Raises: InputError when its function returns another shape."""
-    pixels = entry.compute(gbuffer, atlas, asset)
-    if pixels.ndim != 3 or pixels.shape[:2] != gbuffer.shape or not 1 <= pixels.shape[2] <= 4:
-        raise InputError(f"map {entry.name}: its function returned {pixels.shape}; expected (*{gbuffer.shape}, 1 to 4)")
-    return np.asarray(pixels, np.float32)
-
-
-def blank_gbuffer(size: int) -> GBuffer:
-    """A G-buffer of size × size texels without a surface and without memory, for maps that need none."""
-    nothing = np.broadcast_to(np.float32(0.0), (size, size))
-    vector = np.broadcast_to(np.float32(0.0), (size, size, 3))
-    face = np.broadcast_to(np.int32(-1), (size, size))
-    return GBuffer(vector, vector, nothing, nothing, face, size=size)
-
-
-def _reduced(pixels: NDArray[np.float32], held: NDArray[np.bool_], along: int, entry: BakeMap) -> NDArray[np.float32]:
-    """Samples → texels."""
-    if along == 1:
-        return pixels
-    if entry.value_range == "whole":
-        return first_covered(pixels, held, along)
-    return averaged(pixels, held, along, unit=entry.units == "unit vector")
 
 
 def _say(message: str, warn: Callable[[str], None] | None) -> None:

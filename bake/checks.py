@@ -1,0 +1,123 @@
+"""What can be refused before any work is done: unknown maps, foreign files, packages that are absent.
+
+OpenGL and image libraries are imported when something needs them: an obj file alone does without.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, cast
+
+from ..runtime.errors import InputError
+from ..runtime.extras import requires
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from ..runtime.files import OutputFolder
+    from ..runtime.options import Outputs
+    from .bakemap import BakeMap
+    from .files.exr import ExrSettings
+    from .highpoly.highmaps import HighSource
+
+
+def chosen_maps(
+    outputs: Outputs, *, high: HighSource | None = None, fields: Sequence[Path] = (), seed: int = 0
+) -> list[BakeMap]:
+    """The maps asked for, without "auto".
+
+    Args:
+        outputs: names, normal format, rays.
+        high: high-poly meshes that the maps are taken from.
+        fields: ONNX files, one more map each.
+        seed: of the rays.
+
+    Raises: InputError for an unknown map or a field that is none; MissingDependencyError without flexpara[bake].
+    """
+    if not outputs.maps and not fields:
+        return []
+    with requires("bake"):
+        from .maps.catalogue import find_map
+        from .maps.field import field_map
+        from .maps.rays import RaySettings
+    green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
+    find = find_map if high is None else high.find_map
+    entries = [find(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
+    return [*entries, *(field_map(path) for path in fields)]
+
+
+def check_outputs(
+    output: OutputFolder, outputs: Outputs, maps: Sequence[BakeMap], *, more: Sequence[str] = (), meshes: bool = True
+) -> None:
+    """Refuse early what writing would refuse after the work: foreign files, packages that are absent.
+
+    more: further file names.  meshes: whether meshes and networks are written.
+
+    Raises: InputError, ForeignFileError, MissingDependencyError.
+    """
+    if meshes and "usda" in outputs.formats:
+        check_green(outputs)
+    names = [*possible_files(output.stem, outputs, maps), *more]
+    if meshes:
+        endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
+        names += [f"{output.stem}.{ending}" for ending in endings]
+        names += [f"{output.stem}.preview.png"] if outputs.preview else []
+    output.check([*names, output.report_name])
+    wanted = {
+        "baker": bool(maps),
+        "files.images": bool(maps),
+        "files.gltf": meshes and "glb" in outputs.formats,
+        "pictures.preview": outputs.preview,
+    }
+    with requires("bake"):
+        for module in (name for name, needed in wanted.items() if needed):
+            import_module(f".{module}", __package__)
+
+
+def check_green(outputs: Outputs) -> None:
+    """USD reads +Y, and a usda file names the normal map beside it.  Raises: InputError where that is −Y."""
+    with requires("bake"):
+        from .files.targets import find_target
+    green = outputs.normal_format if outputs.target is None else find_target(outputs.target).green
+    if green != "opengl":
+        raise InputError(f"format usda beside {green} normal maps, expected opengl; leave usda or that choice out")
+
+
+def padding_of(padding: int | None, target: str | None, size: int) -> int | None:
+    """The padding asked for, else that of the target, else None.  Raises: InputError for an unknown target."""
+    if target is None:
+        return padding
+    with requires("bake"):
+        from .files.targets import find_target
+    preset = find_target(target)
+    return preset.padding(size) if padding is None else padding
+
+
+def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list[str]:
+    """Texture files that these maps may become; with a target, both endings that a product may get.
+
+    Raises: InputError for an unknown target.
+    """
+    if not maps:
+        return []
+    if outputs.layers:
+        exr_settings(outputs)
+        return [f"{stem}.exr"]
+    if outputs.target is None:
+        from .files.textures import texture_names
+
+        return list(
+            texture_names({entry.name: entry for entry in maps}, stem, file_type=outputs.texture_format).values()
+        )
+    from .files.targets import find_target
+
+    plain = find_target(outputs.target).file_names([entry.name for entry in maps], stem).values()
+    return [f"{name}.{ending}" for name in plain for ending in ("png", "exr")]
+
+
+def exr_settings(outputs: Outputs) -> ExrSettings:
+    """How layers are stored.  Raises: EncodingError for a compression that OpenEXR has not."""
+    from .files.exr import ExrSettings
+
+    return ExrSettings(outputs.exr_bits, cast("Any", outputs.exr_compression))
