@@ -245,7 +245,8 @@ class UnwrapResult:
 
     def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:
         """The user's points with their uv and chart, as .npz and, in place of the mesh, as .ply."""
-        from .runtime.io.cloudwrite import write_cloud_npz, write_cloud_ply
+        from .runtime.io.cloudfile import write_cloud_npz
+        from .runtime.io.ply.write import write_cloud_ply
 
         uv, chart = self.point_uv()
         for name, write in zip(point_files(output.stem), (write_cloud_ply, write_cloud_npz), strict=True):

@@ -116,7 +116,8 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
 
 def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
     """The mesh in each format asked for."""
-    from ..runtime.io.meshwrite import write_obj, write_ply
+    from ..runtime.io.obj.write import write_obj
+    from ..runtime.io.ply.write import write_ply
 
     stem, files = output.stem, baked.files
     shown = next((files[name] for name in ("base-color", "uv-checker", "chart") if name in files), None)

@@ -36,7 +36,7 @@ from flexpara.bake.raster.context import open_context
 from flexpara.bake.raster.gbuffer import rasterize
 from flexpara.runtime.geometry.normals import smooth_normals
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.io.meshwrite import write_ply
+from flexpara.runtime.io.ply.write import write_ply
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.pack.packing import atlas_from_uv
 

@@ -15,7 +15,8 @@ import numpy as np
 from ..errors import InputError, ShapeError
 from ..geometry.rows import first_of_each
 from .cleaning import SMALLEST_DIAGONAL, weld_vertices
-from .rawmesh import LARGEST_DIAGONAL, as_rgba, unit_vectors
+from .colors import as_rgba
+from .rawmesh import LARGEST_DIAGONAL, unit_vectors
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -134,6 +135,13 @@ def point_uv(mesh: CloudMesh, atlas: Atlas) -> tuple[NDArray[np.float32], NDArra
 def with_changes(cloud: PointCloud, **counts: int) -> PointCloud:
     """The cloud with counts added to its changes, zero ones left out."""
     return replace(cloud, changes={**cloud.changes, **{name: count for name, count in counts.items() if count}})
+
+
+def check_uv(cloud: PointCloud, uv: NDArray[np.float32], chart: NDArray[np.int64]) -> None:
+    """Raises ShapeError where uv or chart don't fit the cloud."""
+    n = len(cloud.points)
+    if uv.shape != (n, 2) or chart.shape != (n,):
+        raise ShapeError(f"uv and chart have shapes {uv.shape} and {chart.shape}, expected {(n, 2)} and {(n,)}")
 
 
 def _columns(name: str, values: ArrayLike, columns: tuple[int, ...], rows: int | None) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Point cloud file → PointCloud.
+"""Point cloud file → PointCloud, and back as .npz.
 
 .ply without faces · .xyz .txt .csv with x y z [nx ny nz | red green blue] · .npy (n, 3) or (n, 6), the same ·
 .npz with "points" [, "normals", "colors"].  Positions are float64 in the units of the file, in its order.  A file may
@@ -8,24 +8,22 @@ come from anyone: nothing is unpickled, and sizes are checked before anything is
 from __future__ import annotations
 
 import hashlib
-import io
-import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, MissingFileError, ShapeError
-from .cloud import PointCloud, cloud_from_arrays
-from .plycloud import MAX_HEADER, ply_header, read_ply_points
+from .cloud import PointCloud, check_uv, cloud_from_arrays
+from .ply.header import FACES, MAX_HEADER, ply_header
+from .ply.read import read_ply_points
+from .tables import MAX_BYTES, TEXT, read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-TEXT = (".xyz", ".txt", ".csv")
 READ = (".ply", *TEXT, ".npy", ".npz")
-MAX_BYTES = 8 << 30
 MAX_POINTS = 200_000_000
 
 Arrays = dict[str, "NDArray[Any]"]
@@ -47,7 +45,7 @@ def is_cloud(path: Path) -> bool:
         header = ply_header(head)
     except InputError:
         return False
-    return header.faces == 0 and any(element.name == "vertex" and element.count for element in header.elements)
+    return header.count(*FACES) == 0 and header.count("vertex") > 0
 
 
 def load_cloud(path: Path) -> PointCloud:
@@ -81,9 +79,11 @@ def load_cloud(path: Path) -> PointCloud:
 def _read(data: bytes, kind: str) -> Arrays:
     if kind == ".ply":
         return dict(read_ply_points(data))
-    if kind == ".npz":
-        return _read_npz(data)
-    return _split(_read_npy(data) if kind == ".npy" else _read_text(data))
+    table = read_table(data, kind)
+    if not isinstance(table, dict):
+        return _split(table)
+    named = table if "points" in table else {"points": next(iter(table.values()))}
+    return named if "normals" in named else {**named, **_split(named["points"])}
 
 
 def _split(table: NDArray[Any]) -> Arrays:
@@ -101,77 +101,13 @@ def _split(table: NDArray[Any]) -> Arrays:
     return {"points": points, "normals": more}
 
 
-def _read_npy(data: bytes) -> NDArray[Any]:
-    """The array of a .npy file; numpy compares no size with the header's promise, so that comes first."""
-    try:
-        file = io.BytesIO(data)
-        version = np.lib.format.read_magic(file)
-        shape, _, kind = (
-            np.lib.format.read_array_header_1_0(file)
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0(file)
-        )
-        if kind.hasobject:
-            raise InputError("the array holds Python objects, expected plain numbers; write it with numpy.save")
-        promised = kind.itemsize * int(np.prod(np.array(shape, dtype=object)))
-        if promised > len(data):
-            raise InputError(
-                f"the header promises {promised} bytes, the file has {len(data)}; it is cut off: copy it again"
-            )
-        return np.load(io.BytesIO(data), allow_pickle=False)
-    except InputError:
-        raise
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"no .npy file of plain numbers ({error}); write it with numpy.save") from error
+def write_cloud_npz(path: Path, cloud: PointCloud, uv: NDArray[np.float32], chart: NDArray[np.int64]) -> None:
+    """Write .npz: points (n, 3) float64, uv (n, 2) float32, chart (n,) int64, and normals, colors where there are any.
 
-
-def _read_npz(data: bytes) -> Arrays:
-    """The array "points" or the only one, and "normals" and "colors" where they are."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}
-            wanted = _wanted(list(sizes))
-            total = sum(sizes[name] for name in wanted.values())
-            if total > MAX_BYTES:
-                raise InputError(f"it unpacks to {total} bytes, at most {MAX_BYTES} are read; thin the points out")
-            arrays = {group: _read_npy(archive.read(f"{name}.npy")) for group, name in wanted.items()}
-    except InputError:
-        raise
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
-        raise InputError(f"no .npz file of plain numbers ({error}); write it with numpy.savez") from error
-    return arrays if "normals" in arrays else {**arrays, **_split(arrays["points"])}
-
-
-def _wanted(names: list[str]) -> dict[str, str]:
-    """Group → the archive's name for it."""
-    if "points" not in names and len(names) == 1:
-        return {"points": names[0]}
-    if "points" not in names:
-        raise InputError(f"the file holds {names}, expected an array 'points', or a single one; save it so")
-    return {group: group for group in ("points", "normals", "colors") if group in names}
-
-
-def _read_text(data: bytes) -> NDArray[np.float64]:
-    """Lines of three or six numbers; comma, semicolon, tab or spaces between; # starts a comment."""
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"no UTF-8 text ({error.reason}); save it as UTF-8") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    delimiter = next((mark for mark in (",", ";", "\t") if lines and mark in lines[0]), None)
-    body = lines if lines and _is_number(lines[0].split(delimiter)[0]) else lines[1:]
-    if not body:
-        raise InputError("the file holds no numbers, expected lines of x y z; check the export")
-    try:
-        return np.loadtxt(body, delimiter=delimiter, ndmin=2, comments=None)
-    except ValueError as error:
-        reason = str(error).splitlines()[0].rstrip(".")
-        raise InputError(f"{reason}; expected lines of x y z, or x y z nx ny nz: mend or remove that line") from error
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    Raises: ShapeError where uv or chart don't fit the cloud.
+    """
+    check_uv(cloud, uv, chart)
+    extra = {"normals": cloud.normals, "colors": cloud.colors}
+    known = {name: values for name, values in extra.items() if values is not None}
+    with path.open("wb") as file:
+        np.savez(file, points=cloud.points, uv=uv, chart=chart, **known)

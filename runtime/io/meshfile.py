@@ -1,29 +1,35 @@
 """Mesh file → Asset.
 
-OBJ and glTF have readers of their own (order, uv and materials stay as they stand); all else goes through trimesh with
-its processing off.  Positions are float64 in the units of the file; face i of the file is face i until cleaning drops
-some.  Triangles of other formats keep their order; quads become two triangles in the order that trimesh gives them.
-A file may come from anyone: it reaches nothing outside its folder, no network, and no pickle.
+obj, ply, stl, off and glTF have readers of their own; all else goes through trimesh.  Positions are float64 in the
+units of the file; face i of the file is face i until cleaning drops some, polygons as triangles.  A file may come from
+anyone: it reaches nothing outside its folder, no network, and no pickle.
 """
 
 from __future__ import annotations
 
 import hashlib
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import MeshError, MissingFileError, ShapeError
+from ..errors import InputError, MeshError, MissingFileError, ShapeError
 from ..mesh import Asset
 from .cleaning import clean
 from .cloudfile import is_cloud
-from .gltffile import read_gltf
-from .materials import read_in_folder
-from .objfile import read_obj
-from .rawmesh import RawMesh, as_rgba, unit_vectors
+from .colors import as_rgba
+from .gltf.scene import read_gltf
+from .obj.read import read_obj
+from .off import read_off
+from .pictures import read_in_folder
+from .ply.read import read_ply
+from .rawmesh import RawMesh, unit_vectors
+from .stl import read_stl
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import trimesh
     from numpy.typing import ArrayLike, NDArray
 
@@ -60,7 +66,7 @@ def load_asset(path: Path) -> Asset:
     data = path.read_bytes()
     try:
         return clean(_read(data, path), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
-    except MeshError as error:
+    except InputError as error:
         raise MeshError(f"{path}: {error}") from error
 
 
@@ -126,11 +132,17 @@ def _array(name: str, values: ArrayLike, columns: tuple[int, ...], kinds: str, r
 
 
 def _read(data: bytes, path: Path) -> RawMesh:
-    kind = path.suffix.lower().removeprefix(".")
-    if kind == "obj":
-        return read_obj(data, lambda name: read_in_folder(path.parent, name))
-    if kind in ("glb", "gltf"):
-        return read_gltf(data, path.parent)
-    from .trimeshfile import read_with_trimesh  # the two formats above do without trimesh, whose import takes 0.6 s
+    kind, folder = path.suffix.lower().removeprefix("."), path.parent
+    readers: dict[str, Callable[[], RawMesh]] = {
+        "obj": lambda: read_obj(data, partial(read_in_folder, folder)),
+        "ply": lambda: read_ply(data, partial(read_in_folder, folder)),
+        "stl": lambda: read_stl(data),
+        "off": lambda: read_off(data),
+        "glb": lambda: read_gltf(data, folder),
+        "gltf": lambda: read_gltf(data, folder),
+    }
+    if kind in readers:
+        return readers[kind]()
+    from .others import read_with_trimesh  # the formats above do without trimesh, whose import takes 0.6 s
 
     return read_with_trimesh(data, path)

@@ -1,18 +1,17 @@
-"""Points in, uv out: .npy .npz .csv .ply → (n, 3), and the answer of a session → .npz or .csv.
+"""Points in, uv out: a table or PLY → (n, 3), and the answer of a session → .npz or .csv.
 
 n points in the units of the source mesh.  Files may come from anyone: nothing is unpickled, sizes are checked first.
 """
 
 from __future__ import annotations
 
-import io
-import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 
 from ..errors import InputError, MissingFileError, ShapeError
+from .ply.read import read_ply_points
+from .tables import TEXT, read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_POINTS = 200_000_000
-READ = (".npy", ".npz", ".csv", ".ply")
+READ = (".npy", ".npz", *TEXT, ".ply")
 WRITTEN = (".npz", ".csv")
 
 
@@ -28,8 +27,8 @@ def read_points(path: Path) -> NDArray[np.float32] | NDArray[np.float64]:
     """Read points.
 
     Args:
-        path: .npy; .npz (the array "points", or the only one); .csv (an optional line of names, then x, y, z first;
-            comma, semicolon, tab or spaces between; lines that start with # are skipped); .ply (its vertices).
+        path: .npy; .npz (the array "points", or the only one); .csv .txt .xyz (x, y, z first, see tables.py); .ply (its
+            vertices).
 
     Returns:
         (n, 3) float32 where the file holds float32, else float64; n may be 0.
@@ -39,15 +38,27 @@ def read_points(path: Path) -> NDArray[np.float32] | NDArray[np.float64]:
         InputError: another extension, unreadable, NaN or infinite, more than MAX_POINTS points.
         ShapeError: not (n, 3) numbers.
     """
-    readers = {".npy": _read_npy, ".npz": _read_npz, ".csv": _read_csv, ".ply": _read_ply}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
+    kind = path.suffix.lower()
+    if kind not in READ:
         raise InputError(f"{path}: extension {path.suffix!r}, expected {' '.join(READ)}; convert the points")
     if not path.is_file():
         raise MissingFileError(f"{path} does not exist, expected a file of points; check the path")
     if path.stat().st_size > 24 * MAX_POINTS:
         raise InputError(f"{path} has {path.stat().st_size} bytes, at most {24 * MAX_POINTS} are read; split it")
-    return _checked(reader(path), path)
+    try:
+        points = _points(path.read_bytes(), kind)
+    except InputError as error:
+        raise type(error)(f"{path}: {error}") from error
+    return _checked(points, path)
+
+
+def _points(data: bytes, kind: str) -> NDArray[Any]:
+    if kind == ".ply":
+        return read_ply_points(data)["points"]
+    table = read_table(data, kind, columns=3)
+    if isinstance(table, dict):
+        return table["points"] if "points" in table else next(iter(table.values()))
+    return table
 
 
 def check_output(path: Path) -> None:
@@ -110,70 +121,3 @@ def _checked(points: NDArray[Any], path: Path) -> NDArray[np.float32] | NDArray[
             f"{int(np.argmax(broken))}), expected finite numbers; remove them"
         )
     return result
-
-
-def _read_npy(path: Path) -> NDArray[Any]:
-    try:
-        return np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{path} is no .npy file of plain numbers ({error}); write it with numpy.save") from error
-
-
-def _read_npz(path: Path) -> NDArray[Any]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = max((entry.file_size for entry in archive.infolist()), default=0)
-        if size > 24 * MAX_POINTS:
-            raise InputError(f"{path} unpacks to {size} bytes, at most {24 * MAX_POINTS} are read; split it")
-        with np.load(path, allow_pickle=False) as arrays:
-            names = list(arrays.files)
-            name = "points" if "points" in names else names[0] if len(names) == 1 else None
-            if name is None:
-                raise InputError(f"{path} holds {names}, expected an array 'points', or a single one; save it so")
-            return arrays[name]
-    except InputError:
-        raise
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise InputError(f"{path} is no .npz file of plain numbers ({error}); write it with numpy.savez") from error
-
-
-def _read_csv(path: Path) -> NDArray[np.float64]:
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip() and line[0] != "#"]
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no UTF-8 text ({error.reason}); save it as UTF-8") from error
-    if not lines:
-        raise InputError(f"{path} is empty, expected lines of x,y,z; check the export")
-    delimiter = next((mark for mark in (",", ";", "\t") if mark in lines[0]), None)
-    body = lines if _is_number(lines[0].split(delimiter)[0]) else lines[1:]
-    if not body:
-        return np.zeros((0, 3))
-    try:
-        return np.loadtxt(body, delimiter=delimiter, usecols=(0, 1, 2), ndmin=2, comments=None)
-    except (ValueError, IndexError) as error:
-        raise InputError(
-            f"{path}: {str(error).rstrip('.')}; expected lines of x,y,z: mend or remove that line"
-        ) from error
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _read_ply(path: Path) -> NDArray[np.float64]:
-    try:
-        scene = trimesh.load_scene(
-            io.BytesIO(path.read_bytes()), file_type="ply", process=False, fix_texture=False, skip_materials=True
-        )
-    except Exception as error:
-        raise InputError(
-            f"{path} is not readable as .ply ({type(error).__name__}: {error}); export it again"
-        ) from error
-    clouds = [np.asarray(geometry.vertices, dtype=np.float64) for geometry in scene.geometry.values()]
-    if not clouds:
-        raise InputError(f"{path} holds no vertices, expected points; check the export")
-    return np.concatenate(clouds)

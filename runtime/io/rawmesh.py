@@ -6,11 +6,11 @@ n file vertices · f faces.  Positions are float64 in source units, uv is v up, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import MeshError, ShapeError
+from ..errors import MeshError
 from ..material import Material
 
 if TYPE_CHECKING:
@@ -60,19 +60,23 @@ def check(raw: RawMesh) -> None:
             f"face {first} refers to vertices {raw.faces[first].tolist()}, expected 0 to {vertex_count - 1}; "
             "the mesh is damaged: export it again"
         )
-    broken = ~np.isfinite(raw.positions).all(axis=1)
+    used = np.zeros(vertex_count, dtype=np.bool_)
+    used[raw.faces] = True
+    broken = used & ~np.isfinite(raw.positions).all(axis=1)
     if broken.any():
         raise MeshError(
-            f"{np.count_nonzero(broken)} of {vertex_count} vertices have NaN or infinite coordinates (first: vertex "
-            f"{int(np.argmax(broken))}), expected finite numbers; delete or repair them"
+            f"{np.count_nonzero(broken)} of {vertex_count} vertices have NaN or infinite coordinates and belong to "
+            f"faces (first: vertex {int(np.argmax(broken))}), expected finite numbers; delete or repair them"
         )
-    largest = float(np.abs(raw.positions).max())
+    largest = float(np.abs(raw.positions[used]).max())
     if largest > LARGEST_DIAGONAL:
         raise MeshError(f"coordinates reach {largest:.3g}, expected at most {LARGEST_DIAGONAL:g}; choose another unit")
 
 
 def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
     """The part under a (4, 4) matrix for column vectors; a mirroring one turns the winding: outside stays outside."""
+    if np.array_equal(world, np.eye(4)):
+        return part
     linear = world[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0.0)
     normals = None
@@ -88,22 +92,27 @@ def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
     )
 
 
-def split_at_corners(part: RawMesh, corner_uv: NDArray[np.float64]) -> RawMesh:
-    """The part with uv given per corner (f, 3, 2): vertices are split where their uv differ, in vertex order."""
-    vertex, uv = part.faces.ravel(), corner_uv.reshape(-1, 2)
-    order = np.lexsort((uv[:, 1], uv[:, 0], vertex))
-    differs = (np.diff(vertex[order]) != 0) | (np.diff(uv[order], axis=0) != 0).any(axis=1)
+def split_at_corners(
+    part: RawMesh, *, uv: NDArray[np.float64] | None = None, colors: NDArray[np.uint8] | None = None
+) -> RawMesh:
+    """The part with uv (f, 3, 2) or colours (f, 3, 4) given per corner: split where they differ, in vertex order."""
+    given = uv if uv is not None else colors
+    if given is None:
+        return part
+    vertex, value = part.faces.ravel(), given.reshape(3 * len(part.faces), -1)
+    order = np.lexsort((*value.T[::-1], vertex))
+    differs = (np.diff(vertex[order]) != 0) | (value[order][1:] != value[order][:-1]).any(axis=1)
     first = np.concatenate([[True], differs])
     faces = np.zeros(len(vertex), dtype=np.int64)
     faces[order] = np.cumsum(first) - 1
-    source = vertex[order][first]
+    source, own = vertex[order][first], value[order][first]
     return replace(
         part,
         positions=part.positions[source],
         faces=faces.reshape(-1, 3),
         normals=None if part.normals is None else part.normals[source],
-        colors=None if part.colors is None else part.colors[source],
-        uv=uv[order][first],
+        colors=own.astype(np.uint8) if uv is None else None if part.colors is None else part.colors[source],
+        uv=own.astype(np.float64) if uv is not None else None if part.uv is None else part.uv[source],
     )
 
 
@@ -174,14 +183,3 @@ def unit_vectors(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows of unit length (a zero row stays zero, not-finite numbers become zero)."""
     finite = np.nan_to_num(vectors, posinf=0.0, neginf=0.0)
     return finite / np.maximum(np.linalg.norm(finite, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-
-
-def as_rgba(colors: NDArray[Any]) -> NDArray[np.uint8]:
-    """(n, 3 or 4) uint8, or float in [0, 1] → (n, 4) uint8; a missing alpha is opaque."""
-    if colors.dtype.kind == "f":
-        colors = np.rint(np.clip(np.nan_to_num(colors), 0.0, 1.0) * 255.0)
-    elif colors.dtype != np.uint8:
-        raise ShapeError(f"colors have dtype {colors.dtype}, expected uint8, or float in [0, 1]; convert them")
-    opaque = np.full((len(colors), 4), 255, dtype=np.uint8)
-    opaque[:, : colors.shape[1]] = colors
-    return opaque

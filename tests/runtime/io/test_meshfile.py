@@ -87,13 +87,16 @@ def test_ply_with_uv_per_corner_splits_there_and_takes_the_texture(tmp_path: Pat
     np.testing.assert_array_equal(asset.materials[0].pictures["base-color"].pixels, np.full((2, 2, 4), 77))
 
 
-def test_face_colours_are_dropped_and_counted(tmp_path: Path) -> None:
+def test_face_colours_split_vertices_where_they_differ(tmp_path: Path) -> None:
     names = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
     text = ply(["0 0 0", "1 0 0", "1 1 0", "0 1 0"], ["3 0 1 2 255 0 0", "3 0 2 3 0 0 255"], face=names)
     (tmp_path / "a.ply").write_text(text)
     asset = load_asset(tmp_path / "a.ply")
-    assert asset.colors is None
-    assert asset.changes == {"dropped_face_colors": 2}
+    assert asset.colors is not None
+    red, blue = asset.colors[asset.faces]
+    assert (red == (255, 0, 0, 255)).all()
+    assert (blue == (0, 0, 255, 255)).all()
+    assert asset.changes == {"welded_vertices": 2}
 
 
 @pytest.mark.parametrize(
@@ -103,7 +106,7 @@ def test_face_colours_are_dropped_and_counted(tmp_path: Path) -> None:
         ("a.stl", b"", "a.stl"),
         ("a.stl", b"nothing", "a.stl"),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 4_000_000_000), r"a\.stl"),
-        ("a.ply", b"nothing", "not readable"),
+        ("a.ply", b"nothing", "no PLY header"),
         ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\n", "a.ply"),
         ("a.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n", "a.off"),
         ("a.md", b"hello", r"extension '\.md'"),
@@ -139,7 +142,7 @@ def test_indices_out_of_range_are_refused_in_ply(tmp_path: Path) -> None:
 
 def test_nan_is_refused_in_a_file(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")
-    with pytest.raises(MeshError, match=r"a\.obj: 1 of 3 vertices have NaN"):
+    with pytest.raises(MeshError, match=r"a\.obj: vertex 2 \(line 2\) has NaN"):
         load_asset(tmp_path / "a.obj")
 
 
@@ -151,8 +154,8 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 
 def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.runtime.io.trimeshfile.MAX_BYTES", 10_000)
-    monkeypatch.setattr("flexpara.runtime.io.trimeshfile.mesh_loaders", {"3mf": None, "3dxml": dict})
+    monkeypatch.setattr("flexpara.runtime.io.others.MAX_BYTES", 10_000)
+    monkeypatch.setattr("flexpara.runtime.io.others.mesh_loaders", {"3mf": None, "3dxml": dict})
     with zipfile.ZipFile(tmp_path / "a.3dxml", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("big", b"\0" * 1_000_000)
     with pytest.raises(MeshError, match="unpacks to 1000000 bytes"):
@@ -162,9 +165,7 @@ def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypa
 def test_a_format_whose_reader_is_absent_names_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from trimesh.exceptions import ExceptionWrapper
 
-    monkeypatch.setattr(
-        "flexpara.runtime.io.trimeshfile.mesh_loaders", {"dae": ExceptionWrapper(ImportError("collada"))}
-    )
+    monkeypatch.setattr("flexpara.runtime.io.others.mesh_loaders", {"dae": ExceptionWrapper(ImportError("collada"))})
     (tmp_path / "a.dae").write_text("")
     with pytest.raises(MissingDependencyError, match="pip install"):
         load_asset(tmp_path / "a.dae")

@@ -102,7 +102,7 @@ def test_points_that_are_not_finite_are_counted(tmp_path: Path) -> None:
         ("a.csv", b"\xff\xfe\x00"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999999\nend_header\n"),
         ("a.ply", b"nothing"),
-        ("a.xyz", b"1 2 3"),
+        ("a.obj", b"v 1 2 3"),
     ],
 )
 def test_damaged_files_say_so_in_one_line(tmp_path: Path, name: str, content: bytes) -> None:
@@ -120,7 +120,7 @@ def test_a_header_that_promises_more_than_the_file_holds_is_refused(tmp_path: Pa
     assert longer != whole
     assert len(longer) == len(whole)
     (tmp_path / "a.npy").write_bytes(longer)
-    with pytest.raises(InputError, match="plain numbers"):
+    with pytest.raises(InputError, match="cut off or damaged"):
         read_points(tmp_path / "a.npy")
 
 

@@ -24,9 +24,9 @@ def test_too_many_faces_are_refused() -> None:
 def test_corner_uv_split_vertices_only_where_they_differ() -> None:
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     uv = SQUARE[faces][:, :, :2].copy()
-    assert len(split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv).positions) == 4
+    assert len(split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv=uv).positions) == 4
     uv[1] += 5.0
-    part = split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv)
+    part = split_at_corners(RawMesh(positions=SQUARE, faces=faces), uv=uv)
     assert part.uv is not None
     assert len(part.positions) == 6
     np.testing.assert_array_equal(part.uv[part.faces], uv)

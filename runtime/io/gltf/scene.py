@@ -6,16 +6,18 @@ sRGB.  Read here and not with trimesh, which drops uv without a material, ignore
 
 from __future__ import annotations
 
+import json
 import struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import MeshError
-from .gltfbuffers import GltfFile, parse_tree, read_accessor, read_buffers
-from .gltfmaterials import read_materials, uv_set
-from .materials import linear_to_srgb
-from .rawmesh import MAX_FACES, RawMesh, merge, transformed
+from ...errors import MeshError
+from ..colors import linear_to_srgb
+from ..polygons import strip_triangles
+from ..rawmesh import MAX_FACES, RawMesh, merge, transformed
+from .buffers import GltfFile, parse_tree, read_accessor, read_buffers
+from .materials import read_materials, uv_set
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..material import Material
+    from ...material import Material
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
@@ -54,9 +56,18 @@ def read_gltf(data: bytes, folder: Path) -> RawMesh:
         struct.error,
         RecursionError,
     ) as error:
-        raise MeshError(
-            f"the glTF file is damaged ({type(error).__name__}: {error}), expected glTF 2.0; export it again"
-        ) from error
+        raise MeshError(f"the glTF file is damaged ({_what(error)}), expected glTF 2.0; export it again") from error
+
+
+def _what(error: Exception) -> str:
+    """What reading stumbled over, in words of the format."""
+    if isinstance(error, KeyError):
+        return f"{str(error.args[0])[:40]!r} is missing or not allowed"
+    if isinstance(error, IndexError):
+        return "a number refers to what is not there"
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno} of its JSON is not readable"
+    return "a value has the wrong type or size"
 
 
 def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
@@ -147,10 +158,9 @@ def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     """(f, 3) int64: triples, a strip (every second one turned, so that all wind alike) or a fan."""
     if mode == TRIANGLES:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
-    count = max(len(indices) - 2, 0)
-    i = np.arange(count)
     if mode == STRIP:
-        return indices[np.stack([i, i + 1 + i % 2, i + 2 - i % 2], axis=1)]
+        return strip_triangles(indices)
+    i = np.arange(max(len(indices) - 2, 0))
     return indices[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
 
 

@@ -1,6 +1,6 @@
-"""Atlas → OBJ or PLY.  Faces keep their order and corners; positions are written so that they read back exactly.
+"""Atlas → OBJ.  Faces keep their order and corners; positions are written so that they read back exactly.
 
-n atlas vertices · f faces.  uv is v up in both formats.
+n atlas vertices · f faces.  uv is v up.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, ShapeError
-from ..geometry.rows import by_first_appearance, equal_rows, first_of_each
+from ...errors import InputError
+from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
+from ..colors import source_colors
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ..mesh import Atlas
+    from ...mesh import Atlas
 
 MATERIAL = "atlas"
 
@@ -46,7 +47,7 @@ def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: N
     first, vertex = _distinct_positions(atlas)
     columns = [atlas.positions[first]]
     if colors is not None:
-        columns.append(_source_colors(atlas, colors)[first, :3] / 255.0)
+        columns.append(source_colors(atlas, colors)[first, :3] / 255.0)
     normal = equal_rows(atlas.normals.astype(np.float64))
     normals = atlas.normals[first_of_each(normal)].astype(np.float64)
     corners = np.stack([vertex[atlas.faces], atlas.faces, normal[atlas.faces]], axis=2) + 1
@@ -68,43 +69,6 @@ def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: N
         library.write_text(f"newmtl {MATERIAL}\nKd 1 1 1\nd 1\nillum 1\nmap_Kd {texture}\n", encoding="utf-8")
 
 
-def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = None) -> None:
-    """Write binary little-endian PLY: double x y z, float nx ny nz s t, and with colours uchar red green blue alpha.
-
-    PLY has one uv per vertex, so vertices are split along seams.
-
-    Args:
-        atlas: what to write.
-        path: the .ply file.
-        colors: (source vertices, 4) uint8, those of the Asset that the atlas came from, or None.
-
-    Raises:
-        ShapeError: colours of another shape or dtype, or too few of them.
-    """
-    fields = [(axis, "<f8") for axis in "xyz"] + [(name, "<f4") for name in ("nx", "ny", "nz", "s", "t")]
-    if colors is not None:
-        fields += [(name, "u1") for name in ("red", "green", "blue", "alpha")]
-    table = np.zeros(len(atlas.positions), dtype=fields)
-    columns = [*atlas.positions.T, *atlas.normals.T, *atlas.uv.T]
-    columns += [] if colors is None else [*_source_colors(atlas, colors).T]
-    for (name, _), column in zip(fields, columns, strict=True):
-        table[name] = column
-    polygons = np.zeros(len(atlas.faces), dtype=[("count", "u1"), ("corner", "<i4", (3,))])
-    polygons["count"], polygons["corner"] = 3, atlas.faces
-    words = {"<f8": "double", "<f4": "float", "u1": "uchar"}
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        "comment flexpara: s t are the atlas uv, v up",
-        f"element vertex {len(table)}",
-        *(f"property {words[kind]} {name}" for name, kind in fields),
-        f"element face {len(polygons)}",
-        "property list uchar int vertex_indices",
-        "end_header",
-    ]
-    path.write_bytes(("\n".join(header) + "\n").encode("ascii") + table.tobytes() + polygons.tobytes())
-
-
 def _distinct_positions(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(m,) the first atlas vertex of each distinct position, and (n,) which of them each atlas vertex shares."""
     order = np.argsort(atlas.source_vertex, kind="stable")
@@ -112,17 +76,6 @@ def _distinct_positions(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int
     vertex = np.zeros(len(order), dtype=np.int64)
     vertex[order] = label
     return order[first_of_each(label)], vertex
-
-
-def _source_colors(atlas: Atlas, colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(n, 4) uint8: the colour of the source vertex of each atlas vertex."""
-    needed = int(atlas.source_vertex.max(initial=-1)) + 1
-    if colors.ndim != 2 or colors.shape[1] != 4 or colors.dtype != np.uint8 or len(colors) < needed:
-        raise ShapeError(
-            f"colors has shape {colors.shape} and dtype {colors.dtype}, expected ({needed} or more, 4) uint8; "
-            "pass Asset.colors"
-        )
-    return colors[atlas.source_vertex]
 
 
 def _rows(keyword: str, numbers: NDArray[np.float64]) -> list[str]:

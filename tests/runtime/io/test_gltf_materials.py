@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.gltfbuffers import GltfFile
-from flexpara.runtime.io.gltfmaterials import read_materials, uv_set
+from flexpara.runtime.io.gltf.buffers import GltfFile
+from flexpara.runtime.io.gltf.materials import read_materials, uv_set
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.material import SLOTS, Material
 

@@ -10,7 +10,8 @@ import trimesh
 
 from flexpara.runtime.errors import InputError, ShapeError
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.io.meshwrite import write_obj, write_ply
+from flexpara.runtime.io.obj.write import write_obj
+from flexpara.runtime.io.ply.write import write_ply
 from flexpara.runtime.mesh import Atlas
 from flexpara.runtime.samples import make_sample
 

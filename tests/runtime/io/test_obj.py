@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.objfile import read_obj
+from flexpara.runtime.errors import InputError
+from flexpara.runtime.io.obj.read import read_obj
 from flexpara.runtime.io.rawmesh import RawMesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -22,6 +22,10 @@ def nothing(_: str) -> bytes | None:
 
 def read(text: str, siblings: Callable[[str], bytes | None] = nothing) -> RawMesh:
     return read_obj(text.encode(), siblings)
+
+
+def nonzero(raw: RawMesh) -> dict[str, int]:
+    return {name: count for name, count in raw.changes.items() if count}
 
 
 def corners(raw: RawMesh) -> list[list[list[float]]]:
@@ -36,7 +40,7 @@ def test_one_triangle() -> None:
 
 
 def test_polygons_become_fans_in_their_place() -> None:
-    raw = read(SQUARE + "v 2 0 0\nf 1 2 3 4\nf 2 5 3\nf 1 2 5 3 4\n")
+    raw = read(SQUARE + "v 2 0.5 0\nf 1 2 3 4\nf 2 5 3\nf 1 2 5 3 4\n")
     np.testing.assert_array_equal(raw.faces, [[0, 1, 2], [0, 2, 3], [1, 4, 2], [0, 1, 4], [0, 4, 2], [0, 2, 3]])
 
 
@@ -67,7 +71,7 @@ def test_normals_on_some_corners_only_are_no_normals() -> None:
 def test_faces_without_uv_among_others_are_counted() -> None:
     raw = read(f"{SQUARE}vt 0.5 0.5\nf 1/1 2/1 3/1\nf 1 3 4\n")
     assert raw.uv is not None
-    assert raw.changes == {"faces_without_uv": 1}
+    assert nonzero(raw) == {"faces_without_uv": 1}
     np.testing.assert_array_equal(raw.uv[raw.faces[1]], np.zeros((3, 2)))
 
 
@@ -113,32 +117,32 @@ def test_what_is_missing_is_counted() -> None:
         f"mtllib a.mtl b.mtl\nmtllib gone.mtl\n{SQUARE}usemtl m\nf 1 2 3\n",
         {"a.mtl b.mtl": b"newmtl m\nmap_Kd x.png"}.get,
     )
-    assert raw.changes == {"missing_materials": 1, "missing_textures": 1}
+    assert nonzero(raw) == {"missing_materials": 1, "missing_textures": 1}
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no face"),
-        ("hello", "no face"),
+        ("", "no vertex and no face"),
+        ("\nhello\n", "it begins with 'hello'"),
         (SQUARE, "points and no faces"),
-        (f"{SQUARE}f 1 2\n", "face 0 has 2 corners"),
-        (f"{SQUARE}f 1 2 5\n", "face 0 refers to 'v' number 5, expected 1 to 4"),
-        (f"{SQUARE}f 1 2 3\nf 0 1 2\n", "face 1 refers to 'v' number 0"),
-        (f"{SQUARE}f 1 2 -5\n", "number -5"),
-        (f"{SQUARE}f 1/1 2/1 3/1\n", "'vt' number 1, expected 1 to 0"),
-        (f"{SQUARE}f 1//9 2//9 3//9\n", "'vn' number 9"),
-        (f"{SQUARE}f a b c\n", "no index"),
-        (f"{SQUARE}f 1 2 99999999999999999999\n", "OBJ"),
-        ("v 0 0\nf 1 1 1\n", "under 3 numbers"),
-        ("v 0 0 zero\nf 1 1 1\n", "no list of numbers"),
-        ("f 1 2 3\n", "'v' number 1, expected 1 to 0"),
-        (f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", "no readable picture"),
+        (f"{SQUARE}f 1 2\n", "all 1 faces have under three corners .first: line 5"),
+        (f"{SQUARE}f 1 2 5\n", "line 5 refers to vertex 5, expected 1 to 4"),
+        (f"{SQUARE}f 1 2 3\n\nf 0 1 2\n", "line 7 refers to vertex 0"),
+        (f"{SQUARE}f 1 2 -5\n", "line 5 refers to vertex -5"),
+        (f"{SQUARE}f 1 2 3\nf a b c\n", "line 6 has the corner 'a'"),
+        (f"{SQUARE}f 1 2 3.5\n", "line 5 has the corner '3.5'"),
+        (f"{SQUARE}f 1 2 99999999999999999999\n", "line 5 has the corner '99999999999999999999'"),
+        ("v 0\nf 1 1 1\n", "line 1 has 1 numbers"),
+        ("v 0 0 0\nv 0 0 zero\nf 1 1 1\n", "line 2 holds what is no number .'0 0 zero'"),
+        ("v 0 0 0\n# ok\nv nan 0 0\nf 1 2 1\n", "vertex 2 .line 3. has NaN"),
+        ("f 1 2 3\n", "line 1 refers to vertex 1, expected 1 to 0"),
+        (f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", "no picture that is read"),
     ],
 )
 def test_damage_is_named_in_one_line(text: str, message: str) -> None:
     files = {"a.mtl": b"newmtl m\nmap_Kd a.png", "a.png": b"no picture"}
-    with pytest.raises(MeshError, match=message) as caught:
+    with pytest.raises(InputError, match=message) as caught:
         read(text, files.get)
     assert "\n" not in str(caught.value)
 
@@ -155,4 +159,46 @@ def test_mixed_corners_read_like_uniform_ones() -> None:
     mixed = read(head + "f 1/1/1 2/2/2 3/1/1\nf 1//1 3//2 4//1\n")
     assert mixed.normals is not None
     np.testing.assert_array_equal(mixed.normals[mixed.faces][:, :, 0], [[0, 1, 0], [0, 1, 0]])
-    assert mixed.changes == {"faces_without_uv": 1}
+    assert nonzero(mixed) == {"faces_without_uv": 1}
+
+
+def test_uv_and_normals_that_are_not_there_count_as_absent() -> None:
+    raw = read(f"{SQUARE}vt 0 0\nf 1/1/1 2/9/1 3/1/1\n")
+    assert raw.normals is None
+    assert nonzero(raw) == {"missing_uv_or_normals": 4, "faces_without_uv": 1}
+    assert read(f"{SQUARE}f 1/1 2/1 3/1\n").uv is None
+
+
+def test_faces_under_three_corners_lines_and_points_are_skipped_and_counted() -> None:
+    raw = read(f"{SQUARE}f 1 2\nf 1 2 3\nl 1 2 3\np 1 2\nl 1 2\n")
+    np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
+    assert nonzero(raw) == {"faces_under_three_corners": 1, "skipped_lines": 2, "skipped_points": 1}
+
+
+def test_vertices_of_two_numbers_lie_at_z_0() -> None:
+    raw = read("v 1 2\nv 3 4 5\nv 6 7\nf 1 2 3\n")
+    np.testing.assert_array_equal(raw.positions, [[1, 2, 0], [3, 4, 5], [6, 7, 0]])
+    assert nonzero(raw) == {"vertices_without_z": 2}
+    np.testing.assert_array_equal(read("v 1 2\nv 3 4\nv 6 7\nf 1 2 3\n").positions[:, 2], 0.0)
+
+
+def test_vertices_without_colours_among_others_are_white_and_counted() -> None:
+    raw = read("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n")
+    np.testing.assert_array_equal(raw.colors, [[255, 0, 0, 255], [255, 255, 255, 255], [0, 0, 255, 255]])
+    assert nonzero(raw) == {"vertices_without_colors": 1}
+
+
+def test_a_concave_polygon_keeps_its_area() -> None:
+    raw = read("v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n")
+    corner = raw.positions[raw.faces]
+    assert np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].min() > 0
+    assert np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum() == 6.0
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_every_encoding_and_line_end_reads_alike(encoding: str, end: str) -> None:
+    text = "# Maßstab\x85 mü\no Körper\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Stück\nf 1 2 3\n".replace("\n", end)
+    raw = read_obj(text.encode(encoding), nothing)
+    np.testing.assert_array_equal(raw.positions[raw.faces], [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    assert raw.materials[0].name == "Stück"

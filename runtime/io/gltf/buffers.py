@@ -11,12 +11,13 @@ import json
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 import numpy as np
 
-from ..errors import MeshError
-from .rawmesh import MAX_FACES
+from ...errors import MeshError
+from ..pictures import inside
+from ..rawmesh import MAX_FACES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -91,16 +92,13 @@ def read_resource(uri: str, folder: Path) -> bytes:
         head, _, body = uri.partition(",")
         try:
             return base64.b64decode(body) if head.endswith(";base64") else unquote(body).encode("latin-1")
-        except (binascii.Error, UnicodeEncodeError) as error:
-            raise MeshError(f"a data URI of the glTF file is damaged ({error}); export it again") from error
-    path = (folder / unquote(uri)).resolve()
-    if urlsplit(uri).scheme or not path.is_relative_to(folder.resolve()):
+        except (binascii.Error, ValueError) as error:
+            raise MeshError("a data URI of the glTF file is damaged; export it again") from error
+    path = None if "://" in uri else inside(folder, unquote(uri))
+    if path is None:
         raise MeshError(
-            f"the glTF file refers to {uri[:120]!r}, expected files in its own folder; embed it (export as .glb)"
-        )
-    if not path.is_file():
-        raise MeshError(
-            f"the glTF file refers to {uri[:120]!r}, which does not lie beside it; copy it there or export as .glb"
+            f"the glTF file refers to {uri[:120]!r}, which does not lie beside it; copy it there, or embed it (export "
+            "as .glb)"
         )
     return path.read_bytes()
 

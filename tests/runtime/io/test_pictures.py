@@ -10,7 +10,9 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.materials import decode_image, linear_to_srgb, read_in_folder, read_mtl
+from flexpara.runtime.io.colors import linear_to_srgb
+from flexpara.runtime.io.obj.materials import read_mtl
+from flexpara.runtime.io.pictures import decode_image, read_in_folder
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -31,9 +33,9 @@ def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPat
     whole = png(np.random.default_rng(0).integers(0, 256, (64, 64, 4)).astype(np.uint8))
     with pytest.raises(MeshError, match="damaged"):
         decode_image(whole[: len(whole) // 2])
-    with pytest.raises(MeshError, match="no readable picture"):
+    with pytest.raises(MeshError, match="no picture that is read"):
         decode_image(b"GIF?")
-    monkeypatch.setattr("flexpara.runtime.io.materials.MAX_PIXELS", 64 * 64 - 1)
+    monkeypatch.setattr("flexpara.runtime.io.pictures.MAX_PIXELS", 64 * 64 - 1)
     with pytest.raises(MeshError, match="64 × 64 pixels"):
         decode_image(whole)
 
@@ -57,7 +59,7 @@ def test_a_material_library_gives_factors_and_counts_missing_pictures() -> None:
     assert missing == 1
     assert materials["a b"].base_color_factor == (0.25, 0.25, 0.25, 1.0)
     assert materials["c"].base_color_factor == (1.0, 0.0, 0.5, 1.0)
-    with pytest.raises(MeshError, match="no numbers"):
+    with pytest.raises(MeshError, match="expected numbers"):
         read_mtl(b"newmtl a\nKd red\n", lambda _: None)
 
 
@@ -83,5 +85,5 @@ def test_physically_based_lines_and_clamping_are_read() -> None:
 
 @pytest.mark.parametrize("line", [b"Ke red", b"Pm nan", b"Pr inf"])
 def test_factors_that_are_no_numbers_are_refused(line: bytes) -> None:
-    with pytest.raises(MeshError, match="no numbers"):
+    with pytest.raises(MeshError, match="expected numbers"):
         read_mtl(b"newmtl a\n" + line + b"\n", lambda _: None)

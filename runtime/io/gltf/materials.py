@@ -8,15 +8,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..material import SLOTS, UNTURNED, Material, Picture
-from .gltfbuffers import GltfFile, buffer_view, read_resource
-from .materials import decode_image, finite
+from ...material import SLOTS, UNTURNED, Material, Picture
+from ..pictures import decode_image
+from ..text import finite
+from .buffers import GltfFile, buffer_view, read_resource
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..material import AlphaMode, Placement, Slot, Wrap
+    from ...material import AlphaMode, Placement, Slot, Wrap
 
 TRANSFORM = "KHR_texture_transform"
 STRENGTH = "KHR_materials_emissive_strength"

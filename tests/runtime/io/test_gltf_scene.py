@@ -15,7 +15,7 @@ import trimesh
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.gltffile import read_gltf
+from flexpara.runtime.io.gltf.scene import read_gltf
 from flexpara.runtime.samples import make_sample
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=np.float32)
@@ -216,7 +216,7 @@ def test_references_out_of_the_folder_are_refused(tmp_path: Path, uri: str, kind
     maker = textured(np.zeros((1, 1, 4), dtype=np.uint8))
     if kind == "image":
         maker.tree["images"] = [{"uri": uri}]
-    with pytest.raises(MeshError, match="expected files in its own folder"):
+    with pytest.raises(MeshError, match="does not lie beside it"):
         read_gltf(maker.gltf(uri if kind == "buffer" else None), folder)
 
 

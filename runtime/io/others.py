@@ -1,4 +1,4 @@
-"""Formats that only trimesh reads → RawMesh, with its processing off.
+"""Formats without a reader of their own (3mf, dae, …) → RawMesh, by trimesh with its processing off.
 
 Triangles keep their order; quads become two triangles in the order that trimesh gives them.  What trimesh makes up
 (grey colours, averaged normals) is left out.  A file may come from anyone: it reaches nothing outside its folder, no
@@ -8,8 +8,9 @@ network, and no pickle.
 from __future__ import annotations
 
 import io
+import logging
+import warnings
 import zipfile
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,9 @@ from trimesh.resolvers import Resolver
 
 from ..errors import InputError, MeshError, MissingDependencyError
 from ..material import Material, Picture, seen_through
-from .materials import picture_pixels, read_in_folder
-from .rawmesh import RawMesh, as_rgba, merge, split_at_corners, transformed, unit_vectors
+from .colors import as_rgba
+from .pictures import picture_pixels, read_in_folder
+from .rawmesh import RawMesh, merge, transformed, unit_vectors
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,9 +31,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_BYTES = 8 << 30
-NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip"})
+NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
 REMEDY = "pip install 'trimesh[easy]', or convert the file"
 MADE_UP_GREY = [102, 102, 102, 255]
+logging.getLogger("trimesh").addHandler(logging.NullHandler())  # its log would end on stderr
 ARCHIVES = frozenset({"3mf", "3dxml", "zae"})
 
 
@@ -61,7 +64,7 @@ def _check_archive(data: bytes) -> None:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
     except zipfile.BadZipFile as error:
-        raise MeshError(f"the file is no zip archive as its format asks ({error}); export it again") from error
+        raise MeshError("the file is no zip archive, as its format asks; export it again") from error
     if size > MAX_BYTES:
         raise MeshError(f"the file unpacks to {size} bytes, at most {MAX_BYTES} are read; decimate the mesh")
 
@@ -98,13 +101,11 @@ def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
     except InputError:
         raise
     except ImportError as error:
-        if error.name == "charset_normalizer":
-            raise MeshError(
-                "its text is not UTF-8, expected a readable file; save it as UTF-8 or convert it"
-            ) from error
-        raise MissingDependencyError(f".{kind} needs a package that is absent ({error}); {REMEDY}") from error
+        raise MissingDependencyError(f".{kind} needs the package {error.name!r}, which is absent; {REMEDY}") from error
     except Exception as error:
-        raise MeshError(f"not readable as .{kind} ({_first_line(error)}); export it again") from error
+        raise MeshError(
+            f"the file is damaged, or no .{kind} that can be read; export it again or convert it"
+        ) from error
     if not parts:
         found = "points or lines only (give points as .ply, .xyz or .npy)" if others else "no face"
         raise MeshError(f"the file holds {found}, expected triangles; give a triangle mesh")
@@ -113,9 +114,9 @@ def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
 
 def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh], int]:
     """The meshes of the scene in its order, and how many other things with vertices it holds."""
-    options: dict[str, Any] = {"fix_texture": False} if kind == "ply" else {}
-    resolver = _FolderResolver(folder)
-    scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=resolver, process=False, **options)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # what is wrong with the file is said once, by the exception or by cleaning
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=_FolderResolver(folder), process=False)
     parts, others = [], 0
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
@@ -125,11 +126,6 @@ def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh],
         else:
             others += len(getattr(geometry, "vertices", ())) > 0
     return parts, others
-
-
-def _first_line(error: Exception) -> str:
-    text = str(error).splitlines()
-    return f"{type(error).__name__}: {text[0][:200]}" if text else type(error).__name__
 
 
 def _part(mesh: trimesh.Trimesh, matrix: NDArray[np.float64]) -> RawMesh:
@@ -159,23 +155,7 @@ def _part(mesh: trimesh.Trimesh, matrix: NDArray[np.float64]) -> RawMesh:
         face_material=None if material is None else np.zeros(len(mesh.faces), dtype=np.int64),
         changes=changes,
     )
-    return transformed(_with_wedge_uv(part, mesh), matrix)
-
-
-def _with_wedge_uv(part: RawMesh, mesh: trimesh.Trimesh) -> RawMesh:
-    """PLY may store uv per corner ("texcoord" of the faces): split the vertices there."""
-    rows = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
-    if isinstance(rows, dict):
-        wedge = rows.get("texcoord")
-    elif isinstance(rows, np.ndarray) and "texcoord" in (rows.dtype.names or ()):
-        wedge = rows["texcoord"]["f1"]
-    else:
-        return part
-    if wedge is None:
-        return part
-    if np.shape(wedge) != (len(part.faces), 6):
-        return replace(part, uv=None, changes={**part.changes, "faces_without_uv": len(part.faces)})
-    return split_at_corners(part, np.asarray(wedge, dtype=np.float64).reshape(-1, 3, 2))
+    return transformed(part, matrix)
 
 
 def _material(source: Any) -> Material | None:

@@ -1,0 +1,1 @@
+"""Wavefront OBJ: its reader, its writer, and the material libraries (.mtl) beside it."""

@@ -1,0 +1,91 @@
+"""OBJ material libraries (.mtl) → materials."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from ...errors import MeshError
+from ...material import Material, Picture, seen_through
+from ..pictures import decode_image
+from ..text import finite, lines_of, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ...material import Slot, Wrap
+
+SLOTS: dict[str, Slot] = {"map_kd": "base-color", "map_ke": "emissive", "norm": "normal"}
+
+
+def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[dict[str, Material], int]:
+    """OBJ material library → materials by name, and how many textures were not found.
+
+    Read are Kd, d, map_Kd, and of the physically based additions Pm, Pr, Ke, map_Ke and norm; of options -clamp on.
+    Kd is a linear factor; beside a texture it is ignored, as exporters leave their default grey there.
+
+    Raises: MeshError for a texture that is no picture.
+    """
+    raw: dict[str, dict[str, str]] = {}
+    current: dict[str, str] = {}
+    for line in lines_of(data):
+        key, _, rest = line.replace("\t", " ").strip().partition(" ")
+        if key.lower() == "newmtl":
+            current = raw.setdefault(rest.strip(), {})
+        else:
+            current[key.lower()] = rest.strip()
+    materials: dict[str, Material] = {}
+    missing = 0
+    for name, fields in raw.items():
+        pictures: dict[Slot, Picture] = {}
+        for key, slot in SLOTS.items():
+            picture = read_sibling(_map_name(fields[key])) if fields.get(key) else None
+            missing += bool(fields.get(key)) and picture is None
+            if picture is not None:
+                pictures[slot] = Picture(decode_image(picture), _mtl_wrap(fields[key]))
+        materials[name] = _mtl_material(name, fields, pictures)
+    return materials, missing
+
+
+def _mtl_material(name: str, fields: Mapping[str, str], pictures: Mapping[Slot, Picture]) -> Material:
+    base = pictures.get("base-color")
+    factor = _factor(fields, base is not None)
+    red, green, blue = _numbers(fields.get("ke", "1 1 1" if "emissive" in pictures else "0 0 0"))
+    return Material(
+        name=name,
+        base_color_factor=factor,
+        pictures=pictures,
+        metallic=_numbers(fields.get("pm", "0"))[0],
+        roughness=_numbers(fields.get("pr", "0.8"))[0],
+        emissive=(red, green, blue),
+        alpha_mode="BLEND" if seen_through(factor, base) else "OPAQUE",
+        tinted=False,
+    )
+
+
+def _mtl_wrap(text: str) -> tuple[Wrap, Wrap]:
+    """Clamped where the options say "-clamp on", else repeated."""
+    words = text.lower().split()
+    clamped = any(pair == ("-clamp", "on") for pair in pairwise(words))
+    return ("clamp", "clamp") if clamped else ("repeat", "repeat")
+
+
+def _numbers(text: str) -> list[float]:
+    """Three numbers in [0, 1]; a single one stands for all.  Raises: MeshError for what is no number."""
+    try:
+        found = [min(max(finite(word), 0.0), 1.0) for word in text.split()]
+    except ValueError as error:
+        raise MeshError(
+            f"a material has the factor {shown(text)}, expected numbers; mend or delete the .mtl file"
+        ) from error
+    return (found * 3)[:3] if len(found) == 1 else [*found, 0.0, 0.0, 0.0][:3]
+
+
+def _map_name(text: str) -> str:
+    """The file name after options such as '-s 1 1 1' (a name with spaces stays whole when there are no options)."""
+    return text.split()[-1] if text.startswith("-") else text
+
+
+def _factor(fields: Mapping[str, str], textured: bool) -> tuple[float, float, float, float]:
+    red, green, blue = (1.0, 1.0, 1.0) if textured else _numbers(fields.get("kd") or "1 1 1")
+    return red, green, blue, _numbers((fields.get("d") or "1").split()[-1])[0]

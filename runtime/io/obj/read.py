@@ -1,0 +1,248 @@
+"""Wavefront OBJ → RawMesh, in the file's own order.
+
+trimesh groups faces by material, reorders what a quad becomes and reads relative indices from the end of the file; here
+face i of the file is face i of the mesh, and vertices are split only where uv or normals differ.  v, vt, vn: positions,
+uv (v up), normals of the file; c corners of all polygons.  Indices in the file count from 1, or back from the last
+element so far when negative; 0 means "absent" until they are resolved.  What other programs read is read: vertices of
+two numbers lie at z = 0, faces of under three corners are skipped, references to uv and normals that are not there
+count as absent.  Each of these is counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import MeshError
+from ...material import Material
+from ..polygons import triangulate
+from ..rawmesh import RawMesh
+from ..text import lines_of, number_table, shown
+from .materials import read_mtl
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+KINDS = ("v", "vt", "vn", "f", "usemtl", "mtllib", "l", "p")
+COLOR_COLUMNS = {6: 3, 7: 4}  # x y z r g b, and x y z w r g b: numbers in a line → first colour
+# (slashes, two in a row) of every corner of a file → which of v, vt, vn its numbers are
+UNIFORM = {(0, False): (0,), (1, False): (0, 1), (2, True): (0, 2), (2, False): (0, 1, 2)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """The file by kind of line: text (after the keyword) and line number of each."""
+
+    text: dict[str, list[str]]
+    number: dict[str, NDArray[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Polygons:
+    """corners: (c, 3) int64 indices from 0 of (v, vt, vn), −1 where absent.  size: (p,) corners of each, ≥ 3.
+
+    number: (p,) line number of each.
+    """
+
+    corners: NDArray[np.int64]
+    size: NDArray[np.int64]
+    number: NDArray[np.int64]
+
+
+def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMesh:
+    """Read an OBJ file.
+
+    Args:
+        data: the bytes of the file.
+        read_sibling: name of a file beside it → its bytes, or None where there is none.
+
+    Raises:
+        MeshError: unreadable numbers, vertices that are not there or not finite, no faces; it names the line.
+    """
+    lines = _split(data)
+    changes = {"skipped_lines": len(lines.text["l"]), "skipped_points": len(lines.text["p"])}
+    positions, colors = _vertices(lines, changes)
+    polygons = _polygons(lines, changes)
+    _check_positions(positions, lines, polygons)
+    triangles, polygon = triangulate(positions, polygons.corners[:, 0], polygons.size)
+    corners = polygons.corners
+    file_uv, _ = number_table(lines.text["vt"], lines.number["vt"], 1, 2)
+    file_normals, _ = number_table(lines.text["vn"], lines.number["vn"], 3, 3)
+    vertex, faces = _split_vertices(corners, triangles)
+    materials, face_material = _materials(lines, polygons.number[polygon], read_sibling, changes)
+    has_uv, has_normals = bool((corners[:, 1] >= 0).any()), bool((corners[:, 2] >= 0).all())
+    if has_uv:
+        changes["faces_without_uv"] = int(np.count_nonzero((corners[triangles, 1] < 0).any(axis=1)))
+    return RawMesh(
+        positions=positions[vertex[:, 0]],
+        faces=faces,
+        normals=file_normals[vertex[:, 2]] if has_normals else None,
+        colors=None if colors is None else colors[vertex[:, 0]],
+        uv=_uv(file_uv, vertex[:, 1]) if has_uv else None,
+        materials=materials,
+        face_material=face_material,
+        changes=changes,
+    )
+
+
+def _split(data: bytes) -> _Lines:
+    """The lines by kind; a backslash at the end joins the next line.  Raises: MeshError where there is no face."""
+    found: dict[str, list[str]] = {kind: [] for kind in KINDS}
+    number: dict[str, list[int]] = {kind: [] for kind in KINDS}
+    waiting = ""
+    for index, line in enumerate(lines_of(data), start=1):
+        if line.endswith("\\"):
+            waiting += line[:-1] + " "
+            continue
+        kind, _, rest = (waiting + line).replace("\t", " ").lstrip().partition(" ")
+        waiting = ""
+        if kind in found:
+            found[kind].append(rest.strip() if kind in ("usemtl", "mtllib") else rest.partition("#")[0])
+            number[kind].append(index)
+    if not found["f"]:
+        raise MeshError(
+            "the file holds points and no faces, expected faces; give points as .ply, .xyz or .npy"
+            if found["v"]
+            else "no vertex and no face in this OBJ file (lines that start with 'v' and 'f'), expected a mesh; "
+            f"it begins with {shown(decode_head(data))}: check the export"
+        )
+    return _Lines(text=found, number={kind: np.array(value, dtype=np.int64) for kind, value in number.items()})
+
+
+def decode_head(data: bytes) -> str:
+    """The first line that is not empty."""
+    return next((line for line in lines_of(data[:1000]) if line.strip()), "")
+
+
+def _vertices(lines: _Lines, changes: dict[str, int]) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
+    """(n, 3) float64 positions, and (n, 4) uint8 colours where the lines have them; changes grow."""
+    numbers, width = number_table(lines.text["v"], lines.number["v"], 2, 8)
+    if numbers.shape[1] < 3:
+        numbers = np.column_stack([numbers, np.zeros(len(numbers))])
+    numbers[width < 3, 2] = 0.0
+    changes["vertices_without_z"] = int(np.count_nonzero(width < 3))
+    first = COLOR_COLUMNS.get(numbers.shape[1])
+    if first is None:
+        return numbers[:, :3], None
+    plain = width < numbers.shape[1]
+    changes["vertices_without_colors"] = int(np.count_nonzero(plain))
+    rgb = np.nan_to_num(numbers[:, first : first + 3])
+    rgb = np.clip(rgb if rgb.max(initial=0.0) > 1.0 else rgb * 255.0, 0.0, 255.0)
+    rgb[plain] = 255.0
+    alpha = np.full((len(rgb), 1), 255.0)
+    return numbers[:, :3], np.rint(np.hstack([rgb, alpha])).astype(np.uint8)
+
+
+def _polygons(lines: _Lines, changes: dict[str, int]) -> _Polygons:
+    """The faces of three corners or more, every index resolved; changes grow."""
+    words = [line.split() for line in lines.text["f"]]
+    whole = [index for index, polygon in enumerate(words) if len(polygon) >= 3]
+    changes["faces_under_three_corners"] = len(words) - len(whole)
+    if not whole:
+        raise MeshError(
+            f"all {len(words)} faces have under three corners (first: line {lines.number['f'][0]}), expected "
+            "triangles or polygons; export the mesh again"
+        )
+    number = lines.number["f"][whole]
+    size = np.array([len(words[index]) for index in whole], dtype=np.int64)
+    flat = [word for index in whole for word in words[index]]
+    at_line = np.repeat(number, size)
+    try:
+        table = _index_table(flat)
+    except (ValueError, OverflowError) as error:
+        place = next(index for index, word in enumerate(flat) if not _is_corner(word))
+        raise MeshError(
+            f"line {at_line[place]} has the corner {shown(flat[place])}, expected indices such as 7, 7/8 or 7/8/9; "
+            "mend or remove that line"
+        ) from error
+    changes["missing_uv_or_normals"] = 0
+    for column, kind in enumerate(("v", "vt", "vn")):
+        count, index = len(lines.text[kind]), table[:, column]
+        so_far = np.searchsorted(lines.number[kind], at_line)
+        resolved = np.where(index > 0, index - 1, np.where(index < 0, so_far + index, -1))
+        outside = (resolved >= count) | ((resolved < 0) & ((index != 0) | (column == 0)))
+        if column == 0 and outside.any():
+            first = int(np.argmax(outside))
+            raise MeshError(
+                f"line {at_line[first]} refers to vertex {index[first]}, expected 1 to {count} or −{so_far[first]} to "
+                "−1; the OBJ file is damaged: export it again"
+            )
+        changes["missing_uv_or_normals"] += int(np.count_nonzero(outside))
+        table[:, column] = np.where(outside, -1, resolved)
+    return _Polygons(table, size, number)
+
+
+def _is_corner(word: str) -> bool:
+    return all((part.lstrip("+-").isdecimal() and len(part) < 19) or not part for part in word.split("/")[:3])
+
+
+def _index_table(words: list[str]) -> NDArray[np.int64]:
+    """'7', '7/8', '7//9' and '7/8/9' → (c, 3) int64, 0 where absent."""
+    forms = {(word.count("/"), "//" in word) for word in words}
+    columns = UNIFORM.get(next(iter(forms)), ()) if len(forms) == 1 else ()
+    if columns:
+        numbers = " ".join(words).replace("//", " ").replace("/", " ").split()
+        if len(numbers) == len(words) * len(columns):
+            table = np.zeros((len(words), 3), dtype=np.int64)
+            table[:, columns] = np.array(list(map(int, numbers)), dtype=np.int64).reshape(-1, len(columns))
+            return table
+    flat = (index for word in words for index in (word + "//").split("/")[:3])
+    return np.array([int(index or 0) for index in flat], dtype=np.int64).reshape(-1, 3)
+
+
+def _check_positions(positions: NDArray[np.float64], lines: _Lines, polygons: _Polygons) -> None:
+    """Refuse vertices of faces that are not finite, by their line."""
+    broken = ~np.isfinite(positions[polygons.corners[:, 0]]).all(axis=1)
+    if broken.any():
+        vertex = int(polygons.corners[np.argmax(broken), 0])
+        raise MeshError(
+            f"vertex {vertex + 1} (line {lines.number['v'][vertex]}) has NaN or infinite coordinates and belongs to a "
+            "face, expected finite numbers; delete or repair it"
+        )
+
+
+def _split_vertices(
+    corners: NDArray[np.int64], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct (v, vt, vn) in that order: (n, 3) int64, and faces (f, 3) int64 into them."""
+    order = np.lexsort((corners[:, 2], corners[:, 1], corners[:, 0]))
+    new = np.concatenate([[True], (np.diff(corners[order], axis=0) != 0).any(axis=1)])
+    vertex = np.zeros(len(corners), dtype=np.int64)
+    vertex[order] = np.cumsum(new) - 1
+    return corners[order][new], vertex[triangles]
+
+
+def _uv(file_uv: NDArray[np.float64], index: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n, 2) float64; a corner without uv gets (0, 0), a one-dimensional coordinate v = 0."""
+    table = np.zeros((len(file_uv) + 1, 2))
+    columns = file_uv.shape[1]
+    table[:-1, :columns] = np.nan_to_num(file_uv, posinf=0.0, neginf=0.0)
+    return table[index]
+
+
+def _materials(
+    lines: _Lines,
+    at_line: NDArray[np.int64],
+    read_sibling: Callable[[str], bytes | None],
+    changes: dict[str, int],
+) -> tuple[tuple[Material, ...], NDArray[np.int64] | None]:
+    """Materials in the order of first use and the (f,) material of each triangle, by its line; changes grow."""
+    if not lines.text["usemtl"]:
+        return (), None
+    known: dict[str, Material] = {}
+    for name in lines.text["mtllib"]:
+        found = read_sibling(name)
+        changes["missing_materials"] = changes.get("missing_materials", 0) + (found is None)
+        if found is not None:
+            library, missing = read_mtl(found, read_sibling)
+            known.update(library)
+            changes["missing_textures"] = changes.get("missing_textures", 0) + missing
+    names = ["default", *lines.text["usemtl"]]
+    used = np.searchsorted(lines.number["usemtl"], at_line)
+    distinct = list(dict.fromkeys(names[index] for index in dict.fromkeys(used.tolist())))
+    place = np.array([distinct.index(name) if name in distinct else -1 for name in names], dtype=np.int64)
+    return tuple(known.get(name, Material(name=name)) for name in distinct), place[used]

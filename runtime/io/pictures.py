@@ -1,0 +1,74 @@
+"""Files beside a mesh file, and pictures: bytes → pixels.
+
+h w texels.  A mesh file may come from anyone: names in it reach no file outside its own folder, and no network.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import PureWindowsPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from ..errors import MeshError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+MAX_PIXELS = 16384 * 16384
+
+
+def read_in_folder(folder: Path, name: str) -> bytes | None:
+    """Bytes of the file of this name inside the folder, or None where there is none.
+
+    OBJ files often name folders of their author's machine: those are looked for beside the mesh by base name.
+    """
+    base = PureWindowsPath(name.strip()).name
+    for candidate in (name.strip(), base):
+        path = inside(folder, candidate)
+        if path is not None:
+            return path.read_bytes()
+    return None
+
+
+def inside(folder: Path, name: str) -> Path | None:
+    """The file of this name if it lies in the folder or below it, else None; links that lead outside are not followed.
+
+    None too for a name that no file can have: it may hold any character.
+    """
+    try:
+        path = (folder / name).resolve()
+        return path if name and path.is_relative_to(folder.resolve()) and path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
+def decode_image(data: bytes) -> NDArray[np.uint8]:
+    """Picture file → (h, w, 4) uint8 sRGB, row 0 = top.
+
+    Raises: MeshError for bytes that are no picture, or more than MAX_PIXELS pixels.
+    """
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            return picture_pixels(image)
+    except (Image.UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
+
+
+def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
+    """Opened picture → (h, w, 4) uint8 sRGB, row 0 = top.
+
+    Raises: MeshError where it is damaged or has more than MAX_PIXELS pixels.
+    """
+    if image.width * image.height > MAX_PIXELS:
+        raise MeshError(
+            f"a texture has {image.width} × {image.height} pixels, at most {MAX_PIXELS} are read; scale it down"
+        )
+    try:
+        return np.asarray(image.convert("RGBA"), dtype=np.uint8)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise MeshError("a texture is damaged, expected a whole PNG or JPEG; remove it or save it as PNG") from error

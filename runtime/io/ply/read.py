@@ -1,0 +1,200 @@
+"""PLY → RawMesh, or the points of a cloud.
+
+n vertices · f triangles.  Faces are polygons or triangle strips (ended by −1, every second triangle turned).  Taken are
+x y z, nx ny nz, red green blue [alpha] (also with diffuse_ before them), s t (or u v, or texture_u texture_v), and of
+faces their corners, colours, texcoord (uv per corner) and texnumber, whatever their order and type.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError, MeshError
+from ...material import Material, Picture, seen_through
+from ..colors import as_rgba
+from ..pictures import decode_image
+from ..polygons import strip_triangles, triangulate
+from ..rawmesh import RawMesh, split_at_corners
+from .body import Lists, read_body
+from .header import FACES, ply_header
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from .body import Table
+    from .header import PlyHeader
+
+COLORS = ("red", "green", "blue", "alpha")
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+CORNERS = ("vertex_indices", "vertex_index")
+
+
+def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMesh:
+    """Read a PLY mesh.
+
+    Args:
+        data: the bytes of the file.
+        read_sibling: name of a file beside it → its bytes, or None where there is none.
+
+    Raises:
+        MeshError: damaged, shorter than its header says, or without vertices or faces.
+    """
+    header = ply_header(data)
+    tables = read_body(data, header, ("vertex", *FACES))
+    if "vertex" not in tables or not header.count(*FACES):
+        names = [element.name for element in header.elements if element.count]
+        raise MeshError(f"the PLY file holds {names}, expected vertices and faces; check the export")
+    vertices = tables["vertex"]
+    positions = _group(vertices, ("x", "y", "z"))
+    if positions is None:
+        raise MeshError(f"the PLY vertices have {[*vertices]}, expected x y z; check the export")
+    uv = next((found for names in UV_NAMES if (found := _group(vertices, names)) is not None), None)
+    colors = _colors(vertices)
+    raw = RawMesh(
+        positions=positions,
+        faces=np.zeros((0, 3), dtype=np.int64),
+        normals=_group(vertices, ("nx", "ny", "nz")),
+        colors=colors,
+        uv=uv,
+    )
+    if "tristrips" in tables:
+        return replace(raw, faces=_strips(tables["tristrips"], len(positions)))
+    return _with_faces(raw, tables["face"], header, read_sibling)
+
+
+def read_ply_points(data: bytes) -> dict[str, NDArray[Any]]:
+    """Positions, normals and colours of the vertices of a PLY file.
+
+    Returns:
+        "points" (n, 3) float64, and where the file has them "normals" (n, 3) float64 and "colors" (n, 4) uint8.
+
+    Raises:
+        InputError: damaged, shorter than its header says, or without x y z.
+    """
+    header = ply_header(data)
+    vertices = read_body(data, header, ("vertex",)).get("vertex")
+    if vertices is None:
+        raise InputError(
+            f"the PLY file holds {[element.name for element in header.elements]}, expected an element vertex; "
+            "check the export"
+        )
+    points = _group(vertices, ("x", "y", "z"))
+    if points is None:
+        raise InputError(f"the PLY vertices have {[*vertices]}, expected x y z; check the export")
+    more = {"normals": _group(vertices, ("nx", "ny", "nz")), "colors": _colors(vertices)}
+    return {"points": points, **{name: values for name, values in more.items() if values is not None}}
+
+
+def _group(table: Table, names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """(n, c) float64 of columns, or None where one is absent or a list."""
+    columns = [table.get(name) for name in names]
+    if any(column is None or isinstance(column, Lists) for column in columns):
+        return None
+    return np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=1)
+
+
+def _colors(table: Table) -> NDArray[np.uint8] | None:
+    """(n, 4) uint8 sRGB of red green blue [alpha]; 16-bit levels are brought to 8."""
+    for prefix in ("", "diffuse_"):
+        columns = [table[f"{prefix}{name}"] for name in COLORS if f"{prefix}{name}" in table]
+        if len(columns) >= 3 and not any(isinstance(column, Lists) for column in columns):
+            kinds = {np.asarray(column).dtype for column in columns}
+            scale = 65535.0 if kinds == {np.dtype("u2")} else 1.0 if {kind.kind for kind in kinds} == {"f"} else 255.0
+            stacked = np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=1) / scale
+            return as_rgba(stacked)
+    return None
+
+
+def _strips(table: Table, vertex_count: int) -> NDArray[np.int64]:
+    """(f, 3) int64 of triangle strips; triangles that repeat a corner join strips and are no triangles."""
+    lists = next((table[name] for name in CORNERS if isinstance(table.get(name), Lists)), None)
+    if not isinstance(lists, Lists):
+        raise MeshError(f"the PLY strips have {[*table]}, expected a list vertex_indices; check the export")
+    values = lists.values.astype(np.int64)
+    ends = np.flatnonzero(values == -1)
+    pieces = np.split(values, np.union1d(np.cumsum(lists.size)[:-1], np.concatenate([ends, ends + 1])))
+    faces = [strip_triangles(piece) for piece in pieces if len(piece) >= 3]
+    joined = np.concatenate([np.zeros((0, 3), dtype=np.int64), *faces])
+    kept = joined[(joined != np.roll(joined, 1, axis=1)).all(axis=1)]
+    if len(kept) == 0:
+        raise MeshError(f"the PLY strips over {vertex_count} vertices hold no triangle; check the export")
+    return kept
+
+
+def _with_faces(raw: RawMesh, table: Table, header: PlyHeader, read_sibling: Callable[[str], bytes | None]) -> RawMesh:
+    """The mesh with its polygons as triangles; vertices are split where colours or uv of faces differ."""
+    lists = next((table[name] for name in CORNERS if isinstance(table.get(name), Lists)), None)
+    if not isinstance(lists, Lists):
+        raise MeshError(f"the PLY faces have {[*table]}, expected a list vertex_indices; check the export")
+    corners, size = lists.values.astype(np.int64), lists.size
+    whole = size >= 3
+    inside = np.repeat(whole, size)
+    changes = {"faces_under_three_corners": int(np.count_nonzero(~whole))}
+    outside = (corners < 0) | (corners >= len(raw.positions))
+    if outside.any():
+        face = int(np.searchsorted(np.cumsum(size), np.argmax(outside), side="right"))
+        raise MeshError(
+            f"face {face} refers to vertex {corners[np.argmax(outside)]}, expected 0 to {len(raw.positions) - 1}; "
+            "the mesh is damaged: export it again"
+        )
+    if not whole.any():
+        raise MeshError(f"all {len(size)} faces of the PLY file have under three corners; check the export")
+    triangles, polygon = triangulate(raw.positions, corners[inside], size[whole])
+    face = np.flatnonzero(whole)[polygon]
+    materials, face_material = _materials(table, face, header, read_sibling, changes)
+    part = replace(
+        raw,
+        faces=corners[inside][triangles],
+        materials=materials,
+        face_material=face_material,
+        changes=changes,
+    )
+    face_colors, face_uv = _colors(table), table.get("texcoord")
+    if face_colors is not None and (face_colors == 255).all():  # MeshLab writes white where there are none
+        face_colors = None
+    if face_colors is not None and raw.colors is not None:
+        changes["dropped_face_colors"], face_colors = len(part.faces), None
+    if isinstance(face_uv, Lists) and face_uv.size.any():
+        if (face_uv.size == 2 * size).all():
+            at_corner = face_uv.values.astype(np.float64).reshape(-1, 2)[inside][triangles]
+            part = split_at_corners(part, uv=at_corner)
+        else:
+            changes["faces_without_uv"] = len(part.faces)
+            part = replace(part, uv=None)
+    if face_colors is not None:
+        part = split_at_corners(part, colors=np.repeat(face_colors[face][:, None], 3, axis=1))
+    return part
+
+
+def _materials(
+    table: Table,
+    face: NDArray[np.int64],
+    header: PlyHeader,
+    read_sibling: Callable[[str], bytes | None],
+    changes: dict[str, int],
+) -> tuple[tuple[Material, ...], NDArray[np.int64] | None]:
+    """A material for each texture named in the header, and the (f,) one of each triangle; changes grow."""
+    if not header.textures:
+        return (), None
+    materials = []
+    for name in header.textures:
+        data = read_sibling(name)
+        changes["missing_textures"] = changes.get("missing_textures", 0) + (data is None)
+        picture = None if data is None else Picture(decode_image(data))
+        materials.append(
+            Material(
+                name=name,
+                pictures={} if picture is None else {"base-color": picture},
+                alpha_mode="BLEND" if seen_through((1.0, 1.0, 1.0, 1.0), picture) else "OPAQUE",
+                tinted=False,
+            )
+        )
+    numbers = table.get("texnumber")
+    if numbers is None or isinstance(numbers, Lists):
+        return tuple(materials), np.zeros(len(face), dtype=np.int64)
+    return tuple(materials), np.clip(numbers[face].astype(np.int64), 0, len(materials) - 1)
