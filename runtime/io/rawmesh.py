@@ -75,8 +75,6 @@ def check(raw: RawMesh) -> None:
 
 def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
     """The part under a (4, 4) matrix for column vectors; a mirroring one turns the winding: outside stays outside."""
-    if np.array_equal(world, np.eye(4)):
-        return part
     linear = world[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0.0)
     normals = None
@@ -84,9 +82,11 @@ def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
         cofactor = np.stack([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
         turned = part.normals @ (-cofactor if mirrored else cofactor).T
         normals = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    with np.errstate(invalid="ignore", over="ignore"):  # positions that are not finite are refused when they are used
+        positions = part.positions @ linear.T + world[:3, 3]
     return replace(
         part,
-        positions=part.positions @ linear.T + world[:3, 3],
+        positions=positions,
         faces=part.faces[:, [0, 2, 1]] if mirrored else part.faces,
         normals=normals,
     )

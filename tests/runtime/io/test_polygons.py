@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ def areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2]
 
 
-def flat(loop: list[tuple[float, float]]) -> np.ndarray:
+def flat(loop: Sequence[Sequence[float]]) -> np.ndarray:
     return np.column_stack([np.array(loop, dtype=np.float64), np.zeros(len(loop))])
 
 

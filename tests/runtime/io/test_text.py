@@ -50,5 +50,5 @@ def test_long_text_is_shown_by_its_beginning() -> None:
 @pytest.mark.parametrize("value", ["nan", "inf", "one", None, [1]])
 def test_finite_refuses_what_is_no_finite_number(value: object) -> None:
     assert finite("1.5") == 1.5
-    with pytest.raises(ValueError, match="finite|float"):
+    with pytest.raises(ValueError, match=r"finite|float"):
         finite(value)
