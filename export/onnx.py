@@ -18,6 +18,7 @@ import torch
 from torch import nn
 
 from ..runtime.errors import MissingFileError, ShapeError
+from ..runtime.files import replace_file
 from ..runtime.sessions.bundle import METADATA_KEY
 from .builder import GraphBuilder
 from .graph import UnwrapGraph, chart_membership, fold_frame
@@ -84,7 +85,7 @@ def export_onnx(
     content = build_model(model, facts, spec)
     points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
     report = prove_parity(UnwrapGraph(frozen_copy(model), facts), content, points, spec.parity)
-    write_whole(path, content)
+    replace_file(path, content)
     return report
 
 
@@ -180,13 +181,3 @@ def _chosen_uv(builder: GraphBuilder, all_uv: str, patch: str, chart: str, metad
     shift = builder.op("Gather", builder.constant(placement[:, :, 2].copy()), chart, axis=0)
     turned = builder.op("ReduceSum", builder.op("Mul", turn, builder.op("Unsqueeze", flat, one)), last, keepdims=0)
     return builder.op("Add", turned, shift)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write next to the target and rename: the file appears whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_bytes(content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

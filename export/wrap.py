@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from ..runtime.errors import MissingFileError
+from ..runtime.files import replace_file
 from ..runtime.sessions.bundle import METADATA_KEY
 from ..runtime.sessions.wrapsession import wrap_json
 from ..train.deploy.fit_wrap import patch_table
@@ -25,7 +26,7 @@ from .builder import GraphBuilder
 from .graph import fold_frame
 from .lowering import Lowering, Value, cut_to_patch, trace
 from .metadata import Provenance, bundle_metadata
-from .onnx import frozen_copy, write_whole
+from .onnx import frozen_copy
 from .wrapgraph import (
     WrapGraph,
     WrapParityReport,
@@ -95,7 +96,7 @@ def export_wrap(
     content = build_inverse(model, facts, spec)
     probes = probe_uv(atlas, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
     report = prove_inverse(WrapGraph(frozen_copy(model), facts), content, probes, spec.parity)
-    write_whole(path, content)
+    replace_file(path, content)
     return report
 
 

@@ -7,17 +7,19 @@ others, may be replaced without `force`.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from .errors import ForeignFileError, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from .mesh import Report
 
@@ -112,12 +114,13 @@ class OutputFolder:
             writer: called with a path of this name in the hidden folder; other files it makes beside it are taken too.
 
         Raises:
-            ForeignFileError, InputError: as `check`, also for those other files.
+            ForeignFileError, InputError: as `check`, also for those other files; InputError: the disk is full.
         """
         self.check([name])
         staging = self._stage()
         before = set(self.names)
-        writer(staging / name)
+        with _disk_full_is_said(self.folder):
+            writer(staging / name)
         if not (staging / name).is_file():
             raise InputError(f"nothing was written as {name}; this is a defect worth reporting")
         self.check(set(self.names) - before)
@@ -130,7 +133,8 @@ class OutputFolder:
         """
         staging = self._stage()
         before = set(self.names)
-        writer(staging)
+        with _disk_full_is_said(self.folder):
+            writer(staging)
         self.check(set(self.names) - before)
 
     def write_report(self, report: Report) -> None:
@@ -151,9 +155,9 @@ class OutputFolder:
         names = sorted(self.names, key=lambda name: (name == self.report_name, name))
         self.check(names)
         staging = self._stage()
-        for name in names:
-            with (staging / name).open("rb") as file:
-                os.fsync(file.fileno())
+        with _disk_full_is_said(self.folder):
+            for name in names:
+                _reach_disk(staging / name)
         for name in names:
             (staging / name).replace(self.folder / name)
         self._made_folder = False
@@ -184,6 +188,28 @@ class OutputFolder:
                 self.folder.rmdir()
 
 
+def replace_file(path: Path, content: bytes) -> None:
+    """Put the content in the place of a file of ours, in a folder that exists: whole or not at all.
+
+    Written beside its place, on the disk before it is renamed: a process killed at any moment leaves the old content
+    or the new one.
+
+    Raises: OSError where that can't be done; nothing is left behind.
+    """
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_bytes(content)
+        _reach_disk(partial)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _reach_disk(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
 def write_whole(path: Path, writer: Callable[[Path], object], *, force: bool = False) -> Path:
     """Write one file that has no report: whole or not at all, and over an existing one only with force.
 
@@ -198,6 +224,19 @@ def write_whole(path: Path, writer: Callable[[Path], object], *, force: bool = F
     with OutputFolder(path.parent, path.stem, force=force) as output:
         output.write(path.name, writer)
         return output.commit()[-1]
+
+
+@contextmanager
+def _disk_full_is_said(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise InputError(
+            f"the disk of {folder} is full ({error.strerror}), expected room for the output; free some, or choose "
+            "another -o"
+        ) from error
 
 
 def _plain(name: str) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, MissingFileError
+from .files import replace_file
 from .options import Options, Outputs
 
 FOLDER = ".checkpoint"
@@ -63,9 +64,7 @@ class Run:
         }
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            partial = self.folder / f".{NAME}.partial"
-            partial.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
-            partial.replace(self.folder / NAME)
+            replace_file(self.folder / NAME, (json.dumps(facts, indent=2) + "\n").encode())
         except OSError as error:
             raise InputError(f"can't write to {self.folder} ({error.strerror}); choose another -o") from error
 

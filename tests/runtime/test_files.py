@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from flexpara.runtime.errors import ForeignFileError, InputError
-from flexpara.runtime.files import OutputFolder, write_whole
+from flexpara.runtime.files import OutputFolder, replace_file, write_whole
 
 
 def text(content: str):  # noqa: ANN201
@@ -191,3 +191,28 @@ def test_a_single_file_is_replaced_only_with_force(tmp_path: Path) -> None:
     assert path.read_text() == "one"
     write_whole(path, text("two"), force=True)
     assert path.read_text() == "two"
+
+
+def test_a_file_of_ours_is_replaced_whole_or_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.json"
+    replace_file(path, b"one")
+    replace_file(path, b"two")
+    assert path.read_bytes() == b"two"
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("flexpara.runtime.files.os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        replace_file(path, b"three")
+    assert path.read_bytes() == b"two"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_a_full_disk_is_bad_input_and_leaves_nothing(tmp_path: Path) -> None:
+    def full(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(InputError, match=r"disk of .* is full .*choose another -o"):
+        write_whole(tmp_path / "new" / "a.npz", full)
+    assert list(tmp_path.iterdir()) == []

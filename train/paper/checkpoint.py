@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,6 +21,7 @@ from safetensors import SafetensorError
 from safetensors import torch as safetensors
 
 from ...runtime.errors import InputError, MissingFileError
+from ...runtime.files import replace_file
 from .config import PaperConfig, config_from_json
 
 if TYPE_CHECKING:
@@ -89,8 +89,8 @@ class Checkpoints:
         }
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(self.folder / name, content)
-            write_whole(self.folder / MANIFEST, (json.dumps(facts, indent=2) + "\n").encode())
+            replace_file(self.folder / name, content)
+            replace_file(self.folder / MANIFEST, (json.dumps(facts, indent=2) + "\n").encode())
             for path in self.folder.iterdir():
                 if TENSOR_NAME.fullmatch(path.name) and path.name != name:
                     path.unlink()
@@ -147,16 +147,6 @@ def _check_scale(folder: Path, tensors: dict[str, Tensor], config: PaperConfig) 
     found = sum(tensor.numel() for name, tensor in tensors.items() if name.startswith("networks."))
     if found < least:
         raise InputError(f"{folder}: {found} weights, expected at least {least} for its config; use another checkpoint")
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write beside the place and rename, so that the file is there whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
-    with partial.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def test_the_next_checkpoint_replaces_the_one_before(saved: Path) -> None:
 @pytest.mark.parametrize("written", [0, 1])
 def test_a_kill_while_writing_leaves_the_old_pair(saved: Path, monkeypatch: pytest.MonkeyPatch, written: int) -> None:
     """Killed in the middle of file number ``written`` of two: half of it lies there under a temporary name."""
-    whole, calls = checkpoint.write_whole, list[str]()
+    whole, calls = checkpoint.replace_file, list[str]()
 
     def killed(path: Path, content: bytes) -> None:
         calls.append(path.name)
@@ -71,7 +71,7 @@ def test_a_kill_while_writing_leaves_the_old_pair(saved: Path, monkeypatch: pyte
             raise KeyboardInterrupt
         whole(path, content)
 
-    monkeypatch.setattr(checkpoint, "write_whole", killed)
+    monkeypatch.setattr(checkpoint, "replace_file", killed)
     with pytest.raises(KeyboardInterrupt):
         Checkpoints(saved, 10).save(state(20), CONFIG, INPUT)
     monkeypatch.undo()

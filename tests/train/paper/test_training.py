@@ -95,7 +95,7 @@ def test_a_kill_between_the_two_files_changes_nothing(tmp_path: Path, monkeypatc
 
     samples = surface_input("tube", 16)
     straight = train_paper(samples, SMALL, silent)
-    whole, written = checkpoint.write_whole, list[str]()
+    whole, written = checkpoint.replace_file, list[str]()
 
     def killed(path: Path, content: bytes) -> None:
         written.append(path.name)
@@ -103,7 +103,7 @@ def test_a_kill_between_the_two_files_changes_nothing(tmp_path: Path, monkeypatc
             raise KeyboardInterrupt
         whole(path, content)
 
-    monkeypatch.setattr(checkpoint, "write_whole", killed)
+    monkeypatch.setattr(checkpoint, "replace_file", killed)
     with pytest.raises(KeyboardInterrupt):
         train_paper(samples, SMALL, silent, Checkpoints(tmp_path, 7))
     monkeypatch.undo()
