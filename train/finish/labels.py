@@ -11,6 +11,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, maximum_flow
 
+from ...runtime.geometry.cutgraph import crease_sharpness
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -30,17 +32,14 @@ class DualGraph(NamedTuple):
 def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> DualGraph:
     """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
 
-    The discount follows 1 − |cos(half the dihedral deviation)|-like growth: none on flat ground, full from 60° on.
-    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join nothing: the
-    surface is cut there anyway.
+    The discount grows with `crease_sharpness`: none on flat ground, full from 60° on.  Edges that are not manifold, or
+    where two faces disagree in orientation (a Möbius strip's), join nothing: the surface is cut there anyway.
     """
     inside = np.flatnonzero(table.manifold)
     pairs = table.edge_faces[inside]
     ends = surface.vertices[table.edges[inside]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    normals = surface.face_normals()
-    cosine = np.einsum("ec,ec->e", normals[pairs[:, 0]], normals[pairs[:, 1]])
-    sharpness = np.clip((1.0 - cosine) / 0.5, 0.0, 1.0)
+    sharpness = crease_sharpness(surface, table)[inside]
     return DualGraph(pairs, length, length * (1.0 - crease_discount * sharpness))
 
 

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
 from ...runtime.errors import ShapeError
+from ...runtime.geometry.cutgraph import closing_paths, edge_costs, path_mask, prune, shortest_paths, trace_back
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.geometry.triangles import signed_areas
-from ..finish.disks import ShortestPaths, disk_cuts, edge_costs, path_mask, prune, shortest_paths, trace_back
+from ..finish.disks import disk_cuts
 from ..sampling import sample_surface
 
 if TYPE_CHECKING:
@@ -142,11 +141,7 @@ def seam_edges(piece: Surface, uv: NDArray[np.float64], config: SeamConfig = Sea
     border = np.unique(table.edges[table.edge_count == 1])
     root = border if len(border) else np.array([far_end(piece, table, torn)])
     paths = shortest_paths(len(piece.vertices), table.edges, cost, root)
-    routes = [
-        [*trace_back(paths.parent, a)[::-1], *trace_back(paths.parent, b)]
-        for a, b in table.edges[closing_edges(table, cost, paths)].tolist()
-    ]
-    mask = path_mask(table, routes)
+    mask = path_mask(table, closing_paths(table, cost, paths))
     if len(border) == 0:
         mask = prune(table, mask)
     start = np.union1d(border, table.edges[mask]) if mask.any() or len(border) else root
@@ -154,25 +149,6 @@ def seam_edges(piece: Surface, uv: NDArray[np.float64], config: SeamConfig = Sea
     if len(border) == 0 and mask.sum() < 2:  # a closed piece without handles, and no band to open it along
         return far_cut(piece, table, plain, config)
     return mask
-
-
-def closing_edges(table: EdgeTable, cost: NDArray[np.float64], paths: ShortestPaths) -> NDArray[np.int64]:
-    """Edges (g,) that each close one short loop around a handle, or way between two borders (tree-cotree).
-
-    They are in neither the tree of shortest paths nor the spanning tree of the dual graph of the longest such loops.
-    Each edge's rank is its weight in that graph, so the spanning tree's weights name its edges.
-    """
-    a, b = table.edges.T
-    in_tree = (paths.parent[a] == b) | (paths.parent[b] == a)
-    free = np.flatnonzero(table.manifold & ~in_tree)
-    loop = paths.distance[a] + paths.distance[b] + cost
-    ranked = free[np.argsort(-loop[free], kind="stable")]
-    ends = np.sort(table.edge_faces[ranked], axis=1)
-    faces = int(table.edge_faces.max()) + 1
-    longest = np.unique(ends[:, 0] * faces + ends[:, 1], return_index=True)[1]
-    weight = (longest + 1.0, (ends[longest, 0], ends[longest, 1]))
-    tree = minimum_spanning_tree(sparse.csr_array(weight, shape=(faces, faces)))
-    return np.setdiff1d(free, ranked[tree.data.astype(np.int64) - 1])
 
 
 def far_cut(piece: Surface, table: EdgeTable, cost: NDArray[np.float64], config: SeamConfig) -> NDArray[np.bool_]:

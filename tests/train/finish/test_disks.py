@@ -1,4 +1,4 @@
-"""Cutting into disks: paths on a grid by hand, prisms and tubes with known cuts, solids of every genus, real meshes."""
+"""Cutting into disks: prisms and tubes with known cuts, solids of every genus, real meshes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.cutgraph import edge_costs
 from flexpara.runtime.geometry.topology import (
     boundary_loops,
     components,
@@ -18,16 +19,7 @@ from flexpara.runtime.geometry.topology import (
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.finish.disks import (
-    cut_open,
-    disk_cuts,
-    edge_costs,
-    is_disk,
-    path_mask,
-    prune,
-    shortest_paths,
-    trace_back,
-)
+from flexpara.train.finish.disks import cut_open, disk_cuts, is_disk
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,15 +35,6 @@ TETRAHEDRON = Surface(
 
 def sample(name: str, resolution: int) -> Surface:
     return Surface(*make_sample(name, resolution=resolution))
-
-
-def flat_grid(columns: int, rows: int) -> Surface:
-    """A flat sheet of unit squares; vertex (i, j) has number i · (rows + 1) + j."""
-    x, y = np.meshgrid(np.arange(columns + 1.0), np.arange(rows + 1.0), indexing="ij")
-    corner = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Surface(np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), faces)
 
 
 def without(surface: Surface, dropped: NDArray[np.bool_]) -> Surface:
@@ -97,69 +80,6 @@ def test_a_triangle_is_a_disk_and_a_tetrahedron_is_not() -> None:
 def test_one_triangle_needs_no_cut() -> None:
     surface = Surface(np.eye(3), TRIANGLE)
     assert not disk_cuts(surface, edge_table(TRIANGLE), 0.8).any()
-
-
-def test_the_shortest_way_over_a_grid_runs_along_its_diagonals() -> None:
-    grid = flat_grid(4, 4)
-    table = edge_table(grid.faces)
-    paths = shortest_paths(25, table.edges, edge_costs(grid, table, 0.0), np.array([0]))
-    assert paths.distance[24] == pytest.approx(4.0 * np.sqrt(2.0))
-    assert paths.distance[23] == pytest.approx(3.0 * np.sqrt(2.0) + 1.0)
-    path = trace_back(paths.parent, 24)
-    assert path == [24, 18, 12, 6, 0]
-    mask = path_mask(table, [path])
-    assert table.edges[mask].tolist() == [[0, 6], [6, 12], [12, 18], [18, 24]]
-
-
-def test_the_way_leads_to_the_nearest_source() -> None:
-    grid = flat_grid(6, 1)
-    table = edge_table(grid.faces)
-    paths = shortest_paths(14, table.edges, edge_costs(grid, table, 0.0), np.array([0, 12]))
-    assert paths.distance[[0, 2, 4, 6, 8, 10, 12]].tolist() == [0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]
-    assert trace_back(paths.parent, 10) == [10, 12]
-    assert trace_back(paths.parent, 0) == [0]
-
-
-def test_out_of_reach_is_infinitely_far() -> None:
-    paths = shortest_paths(3, np.array([[0, 1]]), np.ones(1), np.array([0]))
-    assert paths.distance.tolist() == [0.0, 1.0, np.inf]
-    assert paths.parent.tolist() == [-1, 0, -1]
-
-
-def test_boundary_edges_are_on_no_cut() -> None:
-    grid = flat_grid(3, 2)
-    table = edge_table(grid.faces)
-    mask = path_mask(table, [[0, 3, 6, 7]])
-    assert table.edges[mask].tolist() == [[6, 7]]
-
-
-def test_an_edge_costs_its_length_and_a_crease_a_fifth_of_it() -> None:
-    cube = sample("cube", 8)
-    table = edge_table(cube.faces)
-    ends = cube.vertices[table.edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    crease = (np.abs(ends.mean(axis=1)) > 0.5 - 1e-9).sum(axis=1) == 2
-    assert crease.sum() == 12 * 2
-    assert edge_costs(cube, table, 0.0) == pytest.approx(length)
-    assert edge_costs(cube, table, 0.8) == pytest.approx(np.where(crease, 0.2 * length, length))
-
-
-def test_pruning_keeps_loops_and_drops_what_leads_nowhere() -> None:
-    grid = flat_grid(6, 4)
-    table = edge_table(grid.faces)
-    ring = [6, 11, 12, 7, 6]
-    tail = [12, 17, 22]
-    kept = prune(table, path_mask(table, [ring, tail]))
-    assert np.array_equal(kept, path_mask(table, [ring]))
-    assert not prune(table, path_mask(table, [tail])).any()
-
-
-def test_pruning_writes_to_nothing() -> None:
-    grid = flat_grid(6, 4)
-    table = edge_table(grid.faces)
-    mask = path_mask(table, [[12, 17, 22]])
-    prune(table, mask)
-    assert mask.sum() == 2
 
 
 @pytest.mark.parametrize("name", ["cloth", "cone"])
