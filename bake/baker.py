@@ -113,7 +113,7 @@ def find_maps(
 
 
 def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int32]:
-    """(size, size) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.bleed_free_mip` takes."""
+    """(size, size) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.clean_mip` takes."""
     labels = bake(atlas, {"chart": lambda _, __, face: atlas.face_chart[face] + 1}, size=size, padding=padding)
     return labels["chart"].pixels[..., 0].astype(np.int32) - 1
 

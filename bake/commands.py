@@ -109,7 +109,7 @@ def bake(
             else:
                 baked = bake_textures(folder, atlas, asset, outputs, entries, Clock(progress))
                 facts["textures"] = texture_facts(atlas, baked)
-                facts["textures"]["bleed_free_mip"] = bleeding(atlas, options.size, options.margin)
+                facts["textures"]["clean_mip"] = bleeding(atlas, options.size, options.margin)
         facts |= {} if high is None else {"high": high.report()}
         folder.write_report(facts)
         written = folder.commit()

@@ -156,9 +156,9 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
 def bleeding(atlas: Atlas, size: int, padding: int) -> int:
     """The highest mip level of such textures at which no chart takes in another's texels."""
     from .baker import chart_labels
-    from .seamcheck import bleed_free_mip
+    from .seamcheck import clean_mip
 
-    return bleed_free_mip(chart_labels(atlas, size, padding), atlas)
+    return clean_mip(chart_labels(atlas, size, padding), atlas)
 
 
 def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:

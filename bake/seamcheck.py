@@ -160,7 +160,7 @@ def seam_report(atlas: Atlas, textures: Mapping[str, Texture]) -> dict[str, dict
     return report
 
 
-def bleed_free_mip(labels: NDArray[np.int32], atlas: Atlas) -> int:
+def clean_mip(labels: NDArray[np.int32], atlas: Atlas) -> int:
     """The highest mip level at which bilinear samples on the borders of charts see their own chart alone.
 
     labels: (size, size) int32, the chart of each texel, gutters included, −1 beyond them.  Levels are halved by boxes,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Frame, Surface
+from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
@@ -89,8 +90,9 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
 
     Raises: ParityError when the exported network and torch disagree.
     """
+    packing = PackConfig()
     with clock.stage("pack"):
-        atlas = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"])
+        atlas = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"], config=packing)
     with clock.stage("measure"):
         metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
     report: dict[str, Any] = {
@@ -99,6 +101,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
         "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
         "changes": asset.changes,
         "settings": {**trained.settings, "size": size, "padding": padding},
+        "pack": {"settings": asdict(packing)},
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),
         "train": trained.report,

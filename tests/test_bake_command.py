@@ -49,7 +49,7 @@ def test_every_option_is_in_the_report(square: Path) -> None:
 def test_layers_share_one_file(square: Path) -> None:
     files, report = baked(square, "--maps", "normal,position", "--layers", "--exr-bits", "16")
     assert files == {"square.exr"}
-    assert report["textures"]["bleed_free_mip"] >= 0
+    assert report["textures"]["clean_mip"] >= 0
 
 
 def test_udim_gives_an_image_for_each_square(square: Path) -> None:

@@ -23,13 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
-_ROUNDS = 3
-_STEPS = 4
-_CALMER = 0.75
-_MOST_REPAIRS = 40
-_REACH = 1.0 / 8.0
-_TRUST = 1.0 / 128.0
-_SAMPLE = 1.0 / 1024.0
+    from .config import GrowthConfig
 
 
 def apply_placement(
@@ -42,7 +36,7 @@ def apply_placement(
 
 
 def grown(
-    placement: NDArray[np.float64], outlines: list[NDArray[np.float64]], size: int, padding: int
+    placement: NDArray[np.float64], outlines: list[NDArray[np.float64]], size: int, padding: int, config: GrowthConfig
 ) -> NDArray[np.float64]:
     """The placement (k, 2, 3) with charts shifted and grown as far as the padding allows; never turned or mirrored.
 
@@ -53,6 +47,7 @@ def grown(
         outlines: per chart its outline segments (s, 2, 2) float64 in chart coordinates.
         size: texels per side.
         padding: texels.
+        config: numbers.
 
     Raises:
         FinishError: the padding was not kept to begin with and cannot be restored.
@@ -66,12 +61,12 @@ def grown(
     fit = (1.0 - 2.0 * border) / float(np.ptp(box.reshape(-1, 2), axis=0).max())
     fitted = border + fit * (centre - box.reshape(-1, 2).min(axis=0))
     crowd = _Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
-    trust = _TRUST / max(1.0, math.sqrt(len(outlines) / 24.0))
-    for number in range(_ROUNDS):
-        pairs = facing_segments(crowd.segments(), chart, spacing=_SAMPLE, reach=_REACH)
-        for step in range(_STEPS):
-            crowd = _step(crowd, pairs, border, apart, trust * _CALMER ** (number * _STEPS + step))
-    crowd = _settled(crowd, border, apart)
+    trust = config.trust / max(1.0, math.sqrt(len(outlines) / 24.0))
+    for number in range(config.rounds):
+        pairs = facing_segments(crowd.segments(), chart, spacing=config.sample, reach=config.reach)
+        for step in range(config.steps):
+            crowd = _step(crowd, pairs, border, apart, trust * config.calmer ** (number * config.steps + step))
+    crowd = _settled(crowd, border, apart, config)
     linear, shift = placement[:, :, :2] * crowd.factor, (placement[:, :, 2] - centre) * crowd.factor + crowd.centre
     return np.concatenate([linear, shift[:, :, None]], axis=2)
 
@@ -137,19 +132,19 @@ def _wall_rows(crowd: _Crowd, border: float) -> tuple[csr_array, NDArray[np.floa
     return coo_array((values, (rows, columns))).tocsr(), room
 
 
-def _settled(crowd: _Crowd, border: float, apart: float) -> _Crowd:
+def _settled(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> _Crowd:
     """The crowd with the largest factor that keeps all distances exactly, charts where they are."""
     room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
     walls = float((room / np.maximum(crowd.half, 1e-300)).min())
-    pairs = facing_segments(crowd.segments(), crowd.chart, spacing=_SAMPLE, reach=_REACH)
-    for _ in range(_MOST_REPAIRS):
+    pairs = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.reach)
+    for _ in range(config.repairs):
         crowd = replace(crowd, factor=_largest_factor(crowd, pairs, apart, walls))
-        closest = facing_segments(crowd.segments(), crowd.chart, spacing=_SAMPLE, reach=_SAMPLE)
+        closest = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.sample)
         if _free(crowd, closest, apart):
             return crowd
         pairs = np.concatenate([pairs, closest])
     raise FinishError(
-        f"charts stay closer than {apart:.3g} of the atlas side after {_MOST_REPAIRS} repairs; please report"
+        f"charts stay closer than {apart:.3g} of the atlas side after {config.repairs} repairs; please report"
     )
 
 

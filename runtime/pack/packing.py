@@ -23,19 +23,13 @@ from ..geometry.metrics import uv_charts
 from ..geometry.topology import edge_table
 from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
+from .config import PackConfig, PlaceConfig
 from .growth import apply_placement, grown
 from .placement import Relief, place, relief, solid, turned
 from .seams import atlas_normals, rounded_uv, split_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-_CELLS = 256
-_FILL = 0.6
-_SPARE = 1.4
-_SHRINK = 0.7
-_FEW = 48
-_SHRINKS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +41,9 @@ class _Layout:
     cells: int
 
 
-def pack(asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0) -> Atlas:
+def pack(
+    asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0, config: PackConfig | None = None
+) -> Atlas:
     """Packs charts into one square atlas of exactly size × size texels.
 
     Args:
@@ -56,6 +52,7 @@ def pack(asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0
         size: texels per side, ≥ 1.
         padding: texels kept free around each chart and along the border, ≥ 0.
         seed: of the search for a good layout; same seed, same bytes.
+        config: numbers of placing and growing; None takes the defaults.
 
     Returns:
         The atlas; ``placement`` holds the similarity of each chart, of the same scale for all.
@@ -64,14 +61,15 @@ def pack(asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0
         InputError: size or padding is out of range, or the padding leaves no room for the charts.
         FinishError: a chart has no outline or no finite uv, or a triangle is too thin for float32.
     """
+    config = config or PackConfig()
     _check(asset, charts, size, padding)
     outlines = _outlines(asset.surface.faces, charts)
     angles = np.array([_upright_angle(outline, square=len(outlines) == 1) for outline in outlines])
     upright = [outline @ _rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
     area = float(np.abs(signed_areas(charts.corner_uv)).sum())
-    layout, unit = _search(upright, area, padding / size, np.random.default_rng(seed))
+    layout, unit = _search(upright, area, padding / size, config.place, np.random.default_rng(seed))
     placement = _placement(angles, layout, unit)
-    placement = grown(placement, outlines, size, padding)
+    placement = grown(placement, outlines, size, padding, config.growth)
     corner_uv = apply_placement(placement, charts.face_chart, charts.corner_uv)
     faces, source_vertex, uv = split_vertices(asset.faces, charts.face_chart, corner_uv)
     return Atlas(
@@ -163,37 +161,37 @@ def _upright_angle(outline: NDArray[np.float64], *, square: bool) -> float:
 
 
 def _search(
-    outlines: list[NDArray[np.float64]], area: float, padding: float, rng: np.random.Generator
+    outlines: list[NDArray[np.float64]], area: float, padding: float, config: PlaceConfig, rng: np.random.Generator
 ) -> tuple[_Layout, float]:
     """The best layout found, and the cells per source unit it was found with; padding is a share of the atlas side."""
-    target = int(_CELLS * min(max(math.sqrt(len(outlines) / 24.0), 1.0), 4.0))
+    target = int(config.cells * min(max(math.sqrt(len(outlines) / 24.0), 1.0), 4.0))
     length = sum(float(np.linalg.norm(outline[:, 1] - outline[:, 0], axis=1).sum()) for outline in outlines)
-    unit = _unit(area, length, len(outlines), padding, target)
-    for _ in range(_SHRINKS):
-        cells = int(target * _SPARE)
+    unit = _unit(area, length, len(outlines), padding * target, config.fill * target**2)
+    for _ in range(config.shrinks):
+        cells = int(target * config.spare)
         if math.pi * len(outlines) * (padding * cells) ** 2 > cells**2:
             break
         reliefs = [relief(outline * unit, padding * cells) for outline in outlines]
-        layout = _attempt(reliefs, np.zeros(len(outlines), dtype=np.int64), padding, cells)
+        layout = _attempt(reliefs, np.zeros(len(outlines), dtype=np.int64), padding, cells, config)
         if layout is not None:
-            return _improved(reliefs, layout, padding, rng), unit
-        unit *= _SHRINK
+            return _improved(reliefs, layout, padding, config, rng), unit
+        unit *= config.shrink
     raise InputError(
         f"{len(outlines)} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for texels; "
         "lower the padding or raise the size"
     )
 
 
-def _unit(area: float, length: float, k: int, padding: float, target: int) -> float:
-    """Cells per source unit at which k charts of area and outline length, padded, fill _FILL of target² cells."""
-    reach = padding * target
-    room = _FILL * target**2 - math.pi * k * reach**2
+def _unit(area: float, length: float, k: int, reach: float, filled: float) -> float:
+    """Cells per source unit at which k charts of area and outline length, padded by reach cells, fill so many cells."""
+    room = filled - math.pi * k * reach**2
     half = length * reach / 2.0
-    filled = (math.sqrt(half**2 + area * max(room, 0.0)) - half) / area
-    return max(filled, 2.0 / math.sqrt(area))
+    return max((math.sqrt(half**2 + area * max(room, 0.0)) - half) / area, 2.0 / math.sqrt(area))
 
 
-def _attempt(reliefs: list[Relief], quarters: NDArray[np.int64], padding: float, cells: int) -> _Layout | None:
+def _attempt(
+    reliefs: list[Relief], quarters: NDArray[np.int64], padding: float, cells: int, config: PlaceConfig
+) -> _Layout | None:
     """The layout with these quarter turns on cells² cells, if xatlas finds one."""
     masks: list[NDArray[np.bool_]] = []
     corners: list[NDArray[np.float64]] = []
@@ -203,7 +201,7 @@ def _attempt(reliefs: list[Relief], quarters: NDArray[np.int64], padding: float,
         mask, offset = solid(turned(silhouette, quarter))
         masks.append(mask)
         corners.append((np.stack([low, high]) @ _quarter_turn(quarter).T).min(axis=0) + offset)
-    offset = place(masks, cells)
+    offset = place(masks, cells, exhaustive=len(masks) <= config.few)
     return None if offset is None else _Layout(quarters, offset.astype(np.float64) - np.array(corners), cells)
 
 
@@ -211,24 +209,26 @@ def _quarter_turn(quarter: int) -> NDArray[np.float64]:
     return np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), quarter)
 
 
-def _improved(reliefs: list[Relief], layout: _Layout, padding: float, rng: np.random.Generator) -> _Layout:
+def _improved(
+    reliefs: list[Relief], layout: _Layout, padding: float, config: PlaceConfig, rng: np.random.Generator
+) -> _Layout:
     """Lowers the number of cells: first by bisection as it stands, then by trying other quarter turns."""
     k = len(reliefs)
     filled = sum(int(chart.silhouette(0.0).sum()) for chart in reliefs)
     low, best = math.isqrt(filled) - 1, layout
-    close = 1 if k <= _FEW else best.cells // 50
+    close = 1 if k <= config.few else int(config.coarse * best.cells)
     while best.cells - low > close:
         middle = (best.cells + low) // 2
-        found = _attempt(reliefs, best.quarters, padding, middle)
+        found = _attempt(reliefs, best.quarters, padding, middle, config)
         low, best = (middle, best) if found is None else (low, found)
-    tries = min(60, 600 // k) if k > 1 else 4
+    tries = min(config.tries, config.tried_charts // k) if k > 1 else 4
     for number in range(tries):
         quarters = rng.integers(0, 4, k)
         if number >= tries // 3:
             kept = rng.random(k) >= 1.5 / k
             quarters = np.where(kept, best.quarters, quarters)
         step = 1
-        while (found := _attempt(reliefs, quarters, padding, best.cells - step)) is not None:
+        while (found := _attempt(reliefs, quarters, padding, best.cells - step, config)) is not None:
             best, step = found, step * 2
     return best
 

@@ -23,7 +23,6 @@ from ..geometry.gaps import sample_segments
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_MOST_EXHAUSTIVE = 48
 _HALF_DIAGONAL = 0.5**0.5 + 0.01
 
 
@@ -125,12 +124,13 @@ def _rectangle(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return full
 
 
-def place(masks: list[NDArray[np.bool_]], resolution: int) -> NDArray[np.int64] | None:
+def place(masks: list[NDArray[np.bool_]], resolution: int, *, exhaustive: bool) -> NDArray[np.int64] | None:
     """Places silhouettes on a square grid without common cells.
 
     Args:
         masks: k silhouettes (h, w), each 4-connected, its first and last rows and columns not empty, h and w ≥ 2.
         resolution: cells per side.
+        exhaustive: whether every place is looked at, which takes longer the more charts there are.
 
     Returns:
         (k, 2) int64 column and row of each mask's cell (0, 0), or None where xatlas finds no room.
@@ -147,7 +147,7 @@ def place(masks: list[NDArray[np.bool_]], resolution: int) -> NDArray[np.int64] 
     atlas = xatlas.Atlas()
     indices = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
     atlas.add_uv_mesh(corners.astype(np.float32), indices, owner.astype(np.uint32).reshape(-1, 1))
-    atlas.generate(pack_options=_options(resolution, exhaustive=len(masks) <= _MOST_EXHAUSTIVE))
+    atlas.generate(pack_options=_options(resolution, exhaustive=exhaustive))
     if atlas.chart_count != len(masks):
         raise FinishError(f"xatlas saw {atlas.chart_count} charts in {len(masks)} silhouettes; please report the mesh")
     if atlas.atlas_count != 1 or (atlas.width, atlas.height) != (resolution, resolution):

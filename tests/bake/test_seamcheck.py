@@ -13,7 +13,7 @@ from flexpara.bake.baker import bake, chart_labels
 from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.bake.seamcheck import (
     agrees_across_seams,
-    bleed_free_mip,
+    clean_mip,
     find_seams,
     footprint,
     sample_seams,
@@ -107,12 +107,12 @@ def test_maps_that_jump_by_right_are_not_compared() -> None:
 def test_gutters_carry_as_many_mips_as_they_are_wide(two_charts: Pair, padding: int, level: int) -> None:
     # squares from 16 to 48 and from 80 to 112 of 128 texels touch one texel more; at level m a corner looks 2^m texels
     # away in both directions: (2^m − 1) √2 ≤ padding
-    assert bleed_free_mip(chart_labels(two_charts[0], 128, padding), two_charts[0]) == level
+    assert clean_mip(chart_labels(two_charts[0], 128, padding), two_charts[0]) == level
 
 
 def test_without_a_gutter_the_full_image_bleeds(two_charts: Pair) -> None:
     moved = replace(two_charts[0], uv=two_charts[0].uv + np.float32(0.3 / 64))
-    assert bleed_free_mip(chart_labels(moved, 64, 0), moved) == -1
+    assert clean_mip(chart_labels(moved, 64, 0), moved) == -1
 
 
 def test_a_real_mesh_agrees_across_its_seams(models: Path) -> None:

@@ -72,7 +72,7 @@ def test_a_mask_in_pieces_is_joined_and_still_covers_them(second: tuple[int, int
     column, row = (offset + 1).tolist()
     canvas[row : row + found.shape[0], column : column + found.shape[1]] = found
     assert canvas[1:9, 1:10][mask].all()
-    assert place([found], 16) is not None
+    assert place([found], 16, exhaustive=True) is not None
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -96,7 +96,7 @@ def test_placed_masks_share_no_cell(count: int) -> None:
     rng = np.random.default_rng(count)
     masks = [blob(rng) for _ in range(count)]
     side = int(np.sqrt(sum(mask.sum() for mask in masks) / 0.5)) + 20
-    offset = place(masks, side)
+    offset = place(masks, side, exhaustive=True)
     assert offset is not None
     used = np.zeros((side, side), dtype=np.int64)
     for mask, (column, row) in zip(masks, offset.tolist(), strict=True):
@@ -106,7 +106,7 @@ def test_placed_masks_share_no_cell(count: int) -> None:
 
 def test_a_square_that_fits_exactly_fits_and_no_more() -> None:
     full = np.ones((8, 8), dtype=bool)
-    assert place([full] * 4, 16) is not None
-    assert place([full] * 4, 15) is None
-    assert place([full] * 5, 16) is None
-    assert place([np.ones((2, 20), dtype=bool)], 19) is None
+    assert place([full] * 4, 16, exhaustive=True) is not None
+    assert place([full] * 4, 15, exhaustive=True) is None
+    assert place([full] * 5, 16, exhaustive=True) is None
+    assert place([np.ones((2, 20), dtype=bool)], 19, exhaustive=True) is None
