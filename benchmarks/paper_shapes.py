@@ -78,7 +78,7 @@ def flatten(name: str, coarse: int, fine: int, config: PaperConfig) -> Result:
     """Train on a coarse mesh, judge on a fine one."""
     taught = shape(name, coarse)
     samples = PaperInput(taught.vertices, vertex_normals(taught), taught.faces)
-    networks = train_paper(samples, config, lambda step, loss: None)
+    networks = train_paper(samples, config, lambda _step, _loss: None)
     surface = shape(name, fine)
     with torch.no_grad():
         uv = networks(torch.from_numpy(surface.vertices).float())[1][:, 0].double()

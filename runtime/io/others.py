@@ -86,11 +86,11 @@ class _FolderResolver(Resolver):
         """Names in the folder."""
         return [entry.name for entry in self.folder.iterdir() if entry.is_file()]
 
-    def namespaced(self, namespace: str) -> _FolderResolver:
+    def namespaced(self, namespace: str) -> _FolderResolver:  # noqa: ARG002  # as trimesh calls it
         """The same folder: names never leave it."""
         return self
 
-    def write(self, name: str, data: object) -> None:
+    def write(self, name: str, data: object) -> None:  # noqa: ARG002  # as trimesh calls it
         """Refused: reading writes nothing."""
         raise PermissionError(name)
 

@@ -36,7 +36,7 @@ class FakeRun:
         self.jobs = list[tuple[Job, bool]]()
 
     def __call__(
-        self, job: Job, surface: Surface, budget: float, folder: Path, seams: NDArray[np.float64] | None = None
+        self, job: Job, _surface: Surface, _budget: float, _folder: Path, seams: NDArray[np.float64] | None = None
     ) -> Outcome:
         self.jobs.append((job, seams is not None))
         status = self.statuses.get(job.system, "done")

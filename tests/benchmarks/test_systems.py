@@ -138,7 +138,7 @@ def test_a_preset_that_flexpara_has_not_is_an_input_error() -> None:
 def test_refusals_are_not_run_and_defects_have_failed(
     error: FlexparaError, status: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(job: Job, surface: Surface, seams: NDArray[np.float64] | None) -> Answer:
+    def refuse(_job: Job, _surface: Surface, _seams: NDArray[np.float64] | None) -> Answer:
         raise error
 
     monkeypatch.setitem(systems.SYSTEMS, "flexpara", refuse)

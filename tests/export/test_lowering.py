@@ -152,7 +152,7 @@ def test_what_a_result_does_not_need_is_not_written() -> None:
         (lambda x: torch.cumsum(x, dim=0), "uses cumsum, expected one of"),
         (lambda x: torch.add(x, x, alpha=2), "add: got an unexpected keyword argument 'alpha'"),
         (lambda x: x if x.sum() > 0 else -x, "can't be traced"),
-        (lambda x: MATRIX, "result 1 of the model is constant"),
+        (lambda _: MATRIX, "result 1 of the model is constant"),
         (lambda x: x[:, ::2], "indexes by slice"),
         (lambda x: functional.normalize(x, p=1.0), "normalizes by a 1.0-norm"),
         (lambda x: torch.take_along_dim(x, torch.zeros((2, 3), dtype=torch.int64), 1), "takes indices of shape"),

@@ -137,7 +137,7 @@ def test_only_unknown_charts_and_no_rows_at_all_are_no_error(make_inverse: MapMa
     assert (points.shape, normals.shape) == ((0, 3), (0, 3))
 
 
-def test_no_uv_leads_out_of_the_box_of_the_frame(make_inverse: MapMaker, tmp_path: Path) -> None:
+def test_no_uv_leads_out_of_the_box_of_the_frame(make_inverse: MapMaker) -> None:
     made = make_inverse((0, 1), model=Plane())
     made = dataclasses.replace(made, atlas=dataclasses.replace(made.atlas, placement=made.atlas.placement * 1e-3))
     session_uv = np.random.default_rng(0).random((100, 2)).astype(np.float32)

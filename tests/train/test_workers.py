@@ -20,20 +20,24 @@ def cores(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> in
     return request.param
 
 
-def test_results_come_in_the_order_of_the_items(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_results_come_in_the_order_of_the_items() -> None:
     assert parallel_map(lambda n: n * n, range(50)) == [n * n for n in range(50)]
 
 
-def test_no_items_give_no_results(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_no_items_give_no_results() -> None:
     assert parallel_map(abs, []) == []
 
 
-def test_large_results_pass_through(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_large_results_pass_through() -> None:
     found = parallel_map(lambda n: np.full(300_000, n), [1, 2, 3])
     assert [part.sum() for part in found] == [300_000, 600_000, 900_000]
 
 
-def test_what_the_function_raises_is_raised(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_what_the_function_raises_is_raised() -> None:
     with pytest.raises(FinishError, match="seven"):
         parallel_map(seven_fails, range(20))
 
@@ -56,13 +60,15 @@ def test_a_killed_copy_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
         parallel_map(killed, range(6))
 
 
-def test_no_process_is_left_behind(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_no_process_is_left_behind() -> None:
     parallel_map(abs, range(8))
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)
 
 
-def test_no_file_stays_open(cores: int) -> None:
+@pytest.mark.usefixtures("cores")
+def test_no_file_stays_open() -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
     parallel_map(abs, range(8))
     assert len(list(Path("/proc/self/fd").iterdir())) == before

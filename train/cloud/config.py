@@ -24,8 +24,14 @@ class CloudConfig:
     """Distance from the plane at which a point counts half, in spacings."""
     tree_neighbours: int = 10
     """Nearest points along whose links orientation spreads."""
+    doubtful: float = 0.5
+    """A fitted plane whose cosine with the file's normal is smaller gives way to that normal."""
+    telling: float = 0.5
+    """Two linked normals whose cosine is smaller in size say nothing about orientation."""
     unruly: float = 0.2
     """`normals.disagreement` from which on the normals of a file are oriented anew (random signs have 0.5)."""
+    star_points: int = 20
+    """The most neighbours on the hull of a Delaunay star; stars with more are left open there."""
     opposite: float = -0.3
     """Points whose normals have a smaller cosine are no neighbours: they lie on the other side of a thin sheet."""
     steep: float = 0.2
@@ -34,8 +40,14 @@ class CloudConfig:
     """Least cosine between a triangle's normal and those of its corners."""
     circumradius: float = 2.0
     """Largest circumradius of a triangle."""
+    hole_facing: float = -0.5
+    """Least mean cosine between a triangle that closes a hole and the normals of its corners."""
+    hole_turn: float = 2.0
+    """What a triangle that closes a hole costs is its circumradius times this less that cosine."""
     hole_edges: int = 12
     """Longest boundary loop that is closed."""
+    touching_holes: int = 4
+    """Loops longer than so many times hole_edges are no chains of small holes that touch at vertices."""
     hole_width: float = 5.0
     """Widest extent of a loop that is closed."""
     rounds: int = 4

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from .config import CloudConfig
 
-_LONGEST = 4  # how many small holes may hang together at vertices
-
 
 def hole_triangles(
     points: NDArray[np.float64],
@@ -37,16 +35,16 @@ def hole_triangles(
         normals: (d, 3) float64 unit, oriented as the faces are.
         spacing: (d,) float64 local spacing.
         faces: (f, 3) int64.
-        config: hole_edges, hole_width and facing.
+        config: the numbers of holes.
     """
-    whole = [loop for loop in boundary_loops(faces) if len(loop) <= _LONGEST * config.hole_edges]
+    whole = [loop for loop in boundary_loops(faces) if len(loop) <= config.touching_holes * config.hole_edges]
     loops = [simple[::-1] for loop in whole for simple in simple_loops(loop) if 3 <= len(simple) <= config.hole_edges]
     taken = set(_edge_keys(faces, len(points)).tolist())
     closed: list[NDArray[np.int64]] = [np.zeros((0, 3), dtype=np.int64)]
     for length in sorted({len(loop) for loop in loops}):
         batch = np.stack([loop for loop in loops if len(loop) == length])
         batch = batch[_narrow(points[batch], spacing[batch], config.hole_width)]
-        for triangles in _best(points, normals, batch, config.facing):
+        for triangles in _best(points, normals, batch, config):
             inner = _edge_keys(triangles, len(points))
             values, counts = np.unique(inner, return_counts=True)
             diagonals = set(values[counts == 2].tolist())
@@ -83,7 +81,7 @@ def _narrow(loops: NDArray[np.float64], spacing: NDArray[np.float64], width: flo
 
 
 def _best(
-    points: NDArray[np.float64], normals: NDArray[np.float64], loops: NDArray[np.int64], facing: float
+    points: NDArray[np.float64], normals: NDArray[np.float64], loops: NDArray[np.int64], config: CloudConfig
 ) -> list[NDArray[np.int64]]:
     """The triangulations (m − 2, 3) of those loops (h, m) that have one whose triangles all face outwards."""
     count, m = loops.shape
@@ -97,7 +95,7 @@ def _best(
             corners = np.stack(
                 np.broadcast_arrays(loops[:, first, None], loops[:, between], loops[:, last, None]), axis=2
             )
-            trial = cost[:, first, between] + cost[:, between, last] + _price(points, normals, corners, facing)
+            trial = cost[:, first, between] + cost[:, between, last] + _price(points, normals, corners, config)
             middle[:, first, last] = between[trial.argmin(axis=1)]
             cost[:, first, last] = trial.min(axis=1)
     done = np.isfinite(cost[:, 0, -1])
@@ -105,14 +103,17 @@ def _best(
 
 
 def _price(
-    points: NDArray[np.float64], normals: NDArray[np.float64], corners: NDArray[np.int64], facing: float
+    points: NDArray[np.float64], normals: NDArray[np.float64], corners: NDArray[np.int64], config: CloudConfig
 ) -> NDArray[np.float64]:
-    """(h, b) circumradius of triangles (h, b, 3), infinite where one faces away from the normal of a corner."""
+    """(h, b) costs of triangles (h, b, 3): circumradius, more where they turn from the normals of their corners.
+
+    Infinite where they turn too far.
+    """
     triangles = points[corners]
     unit = triangle_normals(triangles)
     mean = np.einsum("hbc,hbic->hb", unit, normals[corners]) / 3.0
     radius = circumradius(triangles.reshape(-1, 3, 3)).reshape(corners.shape[:2])
-    return np.where(mean > -0.5, radius * (2.0 - mean), np.inf)
+    return np.where(mean > config.hole_facing, radius * (config.hole_turn - mean), np.inf)
 
 
 def _unfolded(loop: NDArray[np.int64], middle: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 _BLOCK = 65536
 _SIXTH = 6
-_LEAST_COSINE = 0.5  # below, a fitted plane is less to be trusted than the normal of the file
 _LEAST_COST = 1e-6  # scipy takes a weight of zero for no edge
 
 
@@ -83,7 +82,7 @@ def fitted_normals(
     if given is None:
         return normals
     cosine = np.einsum("dc,dc->d", normals, given)
-    doubtful = (np.abs(cosine) < _LEAST_COSINE) & given.any(axis=1)
+    doubtful = (np.abs(cosine) < config.doubtful) & given.any(axis=1)
     return np.where(doubtful[:, None], given, normals * np.where(cosine < 0.0, -1.0, 1.0)[:, None])
 
 
@@ -157,7 +156,9 @@ def turned_to(
     return np.where(vote[:, None] < 0.0, -normals, normals)
 
 
-def disagreement(points: NDArray[np.float64], normals: NDArray[np.float64], index: NDArray[np.int64]) -> float:
+def disagreement(
+    points: NDArray[np.float64], normals: NDArray[np.float64], index: NDArray[np.int64], config: CloudConfig
+) -> float:
     """How far given normals are from an orientation: 0 consistent, 0.5 random signs.
 
     The share of links to neighbours across which normals turn over, times 1 − |mean side of the other point|: across a
@@ -167,14 +168,15 @@ def disagreement(points: NDArray[np.float64], normals: NDArray[np.float64], inde
         points: (d, 3) float64.
         normals: (d, 3) float64 unit or zero.
         index: (d, k) int64 neighbours.
+        config: numbers.
     """
     one, other, agreement = _links(points, normals, index)
-    turned = agreement < -0.5
+    turned = agreement < -config.telling
     if not turned.any():
         return 0.0
     way = points[other[turned]] - points[one[turned]]
     side = np.sign(np.einsum("mc,mc->m", way, normals[one[turned]]))
-    return float(turned.sum() / np.count_nonzero(np.abs(agreement) > 0.5) * (1.0 - np.abs(side.mean())))
+    return float(turned.sum() / np.count_nonzero(np.abs(agreement) > config.telling) * (1.0 - np.abs(side.mean())))
 
 
 def _links(

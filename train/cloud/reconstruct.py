@@ -118,7 +118,7 @@ def _local(distinct: DistinctPoints, config: CloudConfig) -> _Local:
         chosen = chosen[np.flatnonzero(apart)]
     given = None if distinct.normals is None else distinct.normals[chosen]
     links = index[:, : config.tree_neighbours]
-    unruly = given is not None and disagreement(points, given, links) > config.unruly
+    unruly = given is not None and disagreement(points, given, links, config) > config.unruly
     normals = fitted_normals(points, index, distance, config, None if unruly else given)
     if given is None or unruly or not given.any(axis=1).all():
         normals = oriented_normals(points, normals, index, spacing, config)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _BLOCK = 16384
 _TURN = 1e-9
-_MOST = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ def star_candidates(
     for start in range(0, len(points), _BLOCK):
         rows = np.arange(start, min(start + _BLOCK, len(points)))
         flat = rolled_neighbours(points, normals, rows, index[rows], config)
-        centre, first, second = star_pairs(flat)
+        centre, first, second = star_pairs(flat, config.star_points)
         parts.append(np.stack([rows[centre], index[rows[centre], first], index[rows[centre], second]], axis=1))
     seen = np.concatenate(parts)
     corners, votes = _counted(seen)
@@ -121,13 +120,12 @@ def rolled_neighbours(
     return flat * stretch[:, :, None]
 
 
-def star_pairs(
-    flat: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def star_pairs(flat: NDArray[np.float64], most: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles of the origin's Delaunay star among neighbours in the plane.
 
     Args:
         flat: (b, k, 2) float64, nearest first; NaN for none.
+        most: corners of the hull that are visited.
 
     Returns:
         (s,) int64 row, and (s,) int64 the two neighbours of each triangle, anticlockwise.
@@ -143,7 +141,7 @@ def star_pairs(
     at, rows = start, np.arange(len(live))
     heading = np.stack([-image[rows, at, 1], image[rows, at, 0]], axis=1)
     found: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
-    for _ in range(_MOST):
+    for _ in range(most):
         following, heading = _next_on_hull(image[rows], at, heading)
         found.append((live[rows], at, following))
         going = following != start

@@ -58,6 +58,10 @@ class GlobalFinishConfig:
     """Slits a component may get: one chart has to do what eight do elsewhere."""
     failures: int = 6
     """Slits that may fail to pay before the component is left as it is."""
+    loosened: int = 6
+    """Rounds in which flips of the learned uv are let go with their neighbours and laid out anew."""
+    kept: float = 0.25
+    """Share of the vertices that must keep their learned uv; with less, that start is given up."""
     steps: int = 30
     """Steps of SLIM with contacts, where the chart would overlap: long cuts need more of them than slits do."""
     conformal: ConformalConfig = field(default_factory=ConformalConfig)
@@ -173,7 +177,7 @@ def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfi
     None and "none" where neither start is valid.
     """
     disk = slit_along(opened.surface, slits, config.finish.relief)
-    circle, learned = circle_start(disk), learned_start(opened)
+    circle, learned = circle_start(disk), learned_start(opened, config)
     starts = {} if circle is None else {"circle": circle}
     if learned is not None:  # a slit leaves the flattening as it is: both sides take the uv of their vertex
         starts["network"] = np.zeros((len(disk.vertices), 2))
@@ -203,21 +207,21 @@ def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: Global
     return tries[best][0], states[best]
 
 
-def learned_start(opened: Opened, rounds: int = 6) -> NDArray[np.float64] | None:
+def learned_start(opened: Opened, config: GlobalFinishConfig) -> NDArray[np.float64] | None:
     """The network's uv at the disk's scale, the band and what folds laid out anew: valid, or None.
 
     Vertices of the band follow from the others by least squares of conformality (LSCM), so each side of the seam goes
-    on as it was; where a flip is left, its vertices and their neighbours are let go too, for ``rounds`` rounds.
+    on as it was; where a flip is left, its vertices and their neighbours are let go too, ``config.loosened`` times.
     """
     surface, uv = opened.surface, at_scale(opened)
     if uv is None:
         return None
     loose = np.zeros(len(uv), dtype=bool)
     wrong_faces = opened.torn | flipped_triangles(uv[surface.faces])
-    for _ in range(rounds):
+    for _ in range(config.loosened):
         loose[surface.faces[wrong_faces]] = True
         kept = np.flatnonzero(~loose)
-        if len(kept) < max(3, len(uv) // 4):  # too little of the learned map is left to follow
+        if len(kept) < max(3, int(config.kept * len(uv))):  # too little of the learned map is left to follow
             return None
         if len(kept) < len(uv):
             corners, faces = np.asfortranarray(surface.vertices), np.asfortranarray(surface.faces)

@@ -7,13 +7,14 @@ points.  The sum over the J_u neighbours of a point stays a sum, as does that ov
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 from torch import Tensor
 
 from ..learn.losses import cosine_gap, position_gap, weighted_mean
-from .losses import angle_gap, box_side, eigenvalue_gap, nearest_gap, repulsion
+from .losses import angle_gap, box_side, eigenvalue_gap, nearest_gap, repulsion, weighted_total
 from .neighbours import Neighbourhood, own_neighbours
 
 if TYPE_CHECKING:
@@ -89,8 +90,7 @@ def global_terms(networks: GlobalNetworks, batch: Batch, config: PaperConfig) ->
 
 def global_loss(networks: GlobalNetworks, batch: Batch, config: PaperConfig) -> Tensor:
     """ℓ_global of one step, a scalar."""
-    terms = global_terms(networks, batch, config)
-    return torch.stack([getattr(config.global_weights, name) * value for name, value in terms.items()]).sum()
+    return weighted_total(global_terms(networks, batch, config), asdict(config.global_weights))
 
 
 def chamfer(xyz: Tensor, batch: Batch) -> Tensor:

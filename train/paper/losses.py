@@ -1,8 +1,8 @@
 """The paper's losses, one value per element.   n points · p charts · t triangles · e edges · j neighbours.
 
-Nothing is weighted or reduced here: `losses.weighted_mean` does that, in one place a mode.  Points and normals of the
-cycle use `train.losses.position_gap` and `cosine_gap`.  Roots that vanish at the optimum are rounded off by a stated
-ε², so every gradient is finite there.
+Reduction is that of `learn.losses.weighted_mean`, and the weights of the terms are put to them in `weighted_total`,
+each in one place.  Points and normals of the cycle use `learn.losses.position_gap` and `cosine_gap`.  Roots that vanish
+at the optimum are rounded off by a stated ε², so every gradient is finite there.
 """
 
 from __future__ import annotations
@@ -96,3 +96,8 @@ def edge_score(score: Tensor, edges: Tensor) -> Tensor:
     """Mean score of the ends of each edge (paper): (…, n), (e, 2) → (…, e)."""
     start, end = edges.unbind(dim=1)
     return 0.5 * (score.index_select(-1, start) + score.index_select(-1, end))
+
+
+def weighted_total(terms: dict[str, Tensor], weights: dict[str, float]) -> Tensor:
+    """Σ weight · term over reduced terms, by their names.  Raises: KeyError for a term without a weight (a defect)."""
+    return torch.stack([weights[name] * value for name, value in terms.items()]).sum()

@@ -8,13 +8,14 @@ so the sum, unlike a mean, weighs the same at any resolution.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
 from ..learn.losses import cosine_gap, position_gap, weighted_mean
-from .losses import box_side, edge_gap, edge_score, eigenvalue_gap, nearest_gap, repulsion
+from .losses import box_side, edge_gap, edge_score, eigenvalue_gap, nearest_gap, repulsion, weighted_total
 from .neighbours import Neighbourhood, chart_neighbours
 
 if TYPE_CHECKING:
@@ -84,7 +85,5 @@ def upper_terms(networks: MultiChartPaperNetworks, batch: Batch, dtype: torch.dt
 
 def chart_loss(networks: MultiChartPaperNetworks, batch: Batch, config: PaperConfig) -> Tensor:
     """ℓ_local of one step, a scalar."""
-    weights = config.chart_weights
-    by_name = {"upper_cycle": weights.cycle}
-    terms = chart_terms(networks, batch, config)
-    return torch.stack([by_name.get(name, getattr(weights, name, 0.0)) * value for name, value in terms.items()]).sum()
+    weights = asdict(config.chart_weights)
+    return weighted_total(chart_terms(networks, batch, config), weights | {"upper_cycle": weights["cycle"]})

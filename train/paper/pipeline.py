@@ -24,7 +24,7 @@ from ..pipeline import Progress, Trained, as_charts, in_turn
 from ..sampling import sample_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
-from .seams import cut_points, tears
+from .seams import SeamConfig, cut_points, tears
 from .training import train_paper
 
 if TYPE_CHECKING:
@@ -38,9 +38,6 @@ if TYPE_CHECKING:
     from .networks import PaperNetworks
 
     Learned = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
-
-SEAM_SAMPLES = 10_000
-"""Surface samples among which the paper's cut points are counted."""
 
 
 def train_paper_surface(
@@ -72,19 +69,25 @@ def train_paper_surface(
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     samples = samples or PaperInput(ball.vertices, vertex_normals(ball), ball.faces)
-    steps = config.steps
+    steps, finishing = config.steps, GlobalFinishConfig(finish=deploy.finish)
     paper = train_paper(samples, config, lambda step, loss: progress("train", step, steps, loss), checkpoints)
-    finished, report = finish_learned(ball, as_numpy(paper), config, in_turn(progress), deploy)
+    finished, report = finish_learned(ball, as_numpy(paper), config, in_turn(progress), finishing)
     charts = as_charts(ball, finished, deploy.patch)
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
     report["finished"] = finished_figures(surface, charts, finished)
     networks = fit_networks(ball, charts, deploy.net, deploy.fit, config.seed, progress)
     settings = {"preset": "paper", **asdict(config), "deploy": asdict(deploy)}
+    if config.mode == "global":
+        settings["global_finish"] = {name: part for name, part in asdict(finishing).items() if name != "finish"}
     return Trained(charts, networks, frame, settings, report, paper)
 
 
 def finish_learned(
-    ball: Surface, learned: Learned, config: PaperConfig, stage: Callable[[str], None], deploy: TrainConfig
+    ball: Surface,
+    learned: Learned,
+    config: PaperConfig,
+    stage: Callable[[str], None],
+    finishing: GlobalFinishConfig,
 ) -> tuple[Finished, dict[str, Any]]:
     """Valid charts of a surface in the unit ball from a learned map, and the map's raw figures.
 
@@ -94,11 +97,11 @@ def finish_learned(
     """
     logits, uv = learned(ball.vertices)
     if config.mode == "global":
-        report = {"raw": raw_global(ball, learned, config)}
-        found = finish_global(ball, uv[:, 0], stage, GlobalFinishConfig(finish=deploy.finish))
+        report = {"raw": raw_global(ball, learned, config, finishing.seam)}
+        found = finish_global(ball, uv[:, 0], stage, finishing)
         return found.finished, {**report, "components": found.components}
     report = {"raw": raw_charts(ball, logits, uv)}
-    return finish(ball, lambda xyz: learned(xyz)[0], config.charts, deploy.finish, stage), report
+    return finish(ball, lambda xyz: learned(xyz)[0], config.charts, finishing.finish, stage), report
 
 
 def vertex_normals(surface: Surface) -> NDArray[np.float64]:
@@ -122,17 +125,16 @@ def as_numpy(networks: PaperNetworks, chunk: int = 16_384) -> Learned:
     return evaluate
 
 
-def raw_global(ball: Surface, learned: Learned, config: PaperConfig) -> dict[str, Any]:
+def raw_global(ball: Surface, learned: Learned, config: PaperConfig, seam: SeamConfig) -> dict[str, Any]:
     """Figures of the learned map itself.
 
-    cut_points: share of surface samples on the seam as the paper extracts it (10,000 samples, so it doesn't depend on
-    the mesh).  seam_faces: share of the area whose faces the band tears.  all: distortions over all faces, as the
-    paper's tables have them; off_seam: over the faces that don't cross the seam, with a scale of their own.
+    cut_points: share of surface samples on the seam as the paper extracts it.  seam_faces: share of the area whose
+    faces the band tears.  all: distortions over all faces, as the paper's tables have them; off_seam: over the faces
+    that don't cross the seam, with a scale of their own.
     """
-    points = sample_surface(ball, SEAM_SAMPLES, np.random.default_rng(config.seed)).xyz
+    points = sample_surface(ball, seam.counted, np.random.default_rng(config.seed)).xyz
     on_seam = cut_points(points, learned(points)[1][:, 0], config.cut_neighbours, config.cut_share)
     uv = learned(ball.vertices)[1][:, 0]
-    seam = GlobalFinishConfig().seam
     torn = tears(ball, uv, seam).face > seam.torn
     areas = ball.face_areas()
     return {

@@ -49,7 +49,13 @@ class SeamConfig:
     samples: int = 4000
     """Surface samples from which the usual stretch nearby is taken …"""
     nearby: int = 200
-    """… as the lower quartile of so many nearest ones."""
+    """… as a quantile of so many nearest ones, …"""
+    quantile: float = 0.25
+    """… this one, since a band has too much …"""
+    least: float = 0.1
+    """… and at least so much of the median over all."""
+    counted: int = 10_000
+    """Surface samples among which the paper's cut points are counted, so that the count doesn't depend on the mesh."""
 
 
 class Tears(NamedTuple):
@@ -113,13 +119,13 @@ def tears(piece: Surface, uv: NDArray[np.float64], config: SeamConfig, table: Ed
 def usual_stretch(
     piece: Surface, uv: NDArray[np.float64], places: NDArray[np.float64], config: SeamConfig
 ) -> NDArray[np.float64]:
-    """(m,) √(uv area / area) around places (m, 3): the lower quartile, as bands have too much; never near 0."""
+    """(m,) √(uv area / area) around places (m, 3): a low quantile, as bands have too much; never near 0."""
     flat = np.abs(signed_areas(uv[piece.faces]))
     scale = np.sqrt(flat / np.maximum(piece.face_areas(), 1e-300))
     samples = sample_surface(piece, config.samples, np.random.default_rng(0))  # fixed: seams follow from the map alone
     value = scale[samples.face]
-    local = np.quantile(value[KDTree(samples.xyz).query(samples.xyz, k=config.nearby)[1]], 0.25, axis=1)
-    return np.maximum(local, 0.1 * float(np.median(value)))[KDTree(samples.xyz).query(places)[1]]
+    local = np.quantile(value[KDTree(samples.xyz).query(samples.xyz, k=config.nearby)[1]], config.quantile, axis=1)
+    return np.maximum(local, config.least * float(np.median(value)))[KDTree(samples.xyz).query(places)[1]]
 
 
 def seam_edges(piece: Surface, uv: NDArray[np.float64], config: SeamConfig = SeamConfig()) -> NDArray[np.bool_]:

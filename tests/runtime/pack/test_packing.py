@@ -44,7 +44,7 @@ def rectangles(sides: NDArray[np.float64], angles: NDArray[np.float64]) -> tuple
     return asset, Charts(chart, uv, chart, np.arange(k), ("slim",) * k)
 
 
-def box_charts(surface: Surface, cosine: float = 0.6) -> Charts:
+def box_charts(surface: Surface) -> Charts:
     """Charts of a closed mesh: connected faces with the same main normal direction, seen along it."""
     normals = surface.face_normals()
     main = np.abs(normals).argmax(axis=1)

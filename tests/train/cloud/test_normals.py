@@ -95,8 +95,8 @@ def test_random_signs_disagree_at_every_second_link_and_oriented_ones_nowhere() 
     points = sphere(2000)
     index, _ = nearest_neighbours(points, 8)
     sign = np.random.default_rng(8).choice([-1.0, 1.0], (2000, 1))
-    assert disagreement(points, points, index) == 0.0
-    assert disagreement(points, sign * points, index) == pytest.approx(0.5, abs=0.05)
+    assert disagreement(points, points, index, CONFIG) == 0.0
+    assert disagreement(points, sign * points, index, CONFIG) == pytest.approx(0.5, abs=0.05)
 
 
 @pytest.mark.parametrize("outside", [1.0, -1.0])
@@ -105,7 +105,7 @@ def test_a_thin_sheet_and_a_narrow_gap_are_no_disagreement(outside: float) -> No
     side = np.where(up, 1.0, -1.0)[:, None] * [[0.0, 0.0, 1.0]]
     points = np.column_stack([np.random.default_rng(17).random((3000, 2)), np.zeros(3000)]) + 0.005 * side
     index, _ = nearest_neighbours(points, 8)
-    assert disagreement(points, outside * side, index) == 0.0
+    assert disagreement(points, outside * side, index, CONFIG) == 0.0
 
 
 def test_unknown_normals_take_the_side_of_known_ones_nearby() -> None:

@@ -20,28 +20,28 @@ def test_the_circumradius_of_a_right_triangle_is_half_its_hypotenuse() -> None:
 
 def test_the_star_of_four_neighbours_in_a_cross_is_four_triangles() -> None:
     cross = np.array([[[1.0, 0.1], [0.0, 1.0], [-1.1, 0.0], [0.0, -1.2], [3.0, 3.0], [np.nan, np.nan]]])
-    row, first, second = star_pairs(cross)
+    row, first, second = star_pairs(cross, CONFIG.star_points)
     assert set(zip(first.tolist(), second.tolist(), strict=True)) == {(0, 1), (1, 2), (2, 3), (3, 0)}
     assert (row == 0).all()
 
 
 def test_a_star_at_a_corner_is_open() -> None:
     corner = np.array([[[1.0, 0.0], [0.0, 1.2], [0.9, 0.9]]])
-    _, first, second = star_pairs(corner)
+    _, first, second = star_pairs(corner, CONFIG.star_points)
     assert set(zip(first.tolist(), second.tolist(), strict=True)) == {(0, 2), (2, 1)}
 
 
 def test_rows_with_fewer_than_two_neighbours_have_no_star() -> None:
     flat = np.full((3, 4, 2), np.nan)
     flat[1, 0] = 1.0
-    assert all(len(column) == 0 for column in star_pairs(flat))
+    assert all(len(column) == 0 for column in star_pairs(flat, CONFIG.star_points))
 
 
 def test_stars_in_the_plane_are_those_of_the_delaunay_triangulation() -> None:
     points = np.random.default_rng(2).random((400, 2))
     flat = points[None] - points[:, None]
     flat[np.arange(400), np.arange(400)] = np.nan
-    row, first, second = star_pairs(flat)
+    row, first, second = star_pairs(flat, CONFIG.star_points)
     stars, votes = np.unique(np.sort(np.stack([row, first, second], axis=1), axis=1), axis=0, return_counts=True)
     expected = np.sort(Delaunay(points).simplices, axis=1)
     np.testing.assert_array_equal(stars, expected[np.lexsort(expected.T[::-1])])

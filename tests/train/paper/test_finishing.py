@@ -115,7 +115,7 @@ def test_the_learned_uv_of_a_tube_are_valid_once_its_band_is_laid_out_anew(width
     tube, uv = unrolled_tube(width)
     opened = open_along_seam(tube, np.arange(len(tube.faces)), uv, CONFIG.seam)[1]
     assert not is_valid(opened.surface, opened.uv)
-    start = learned_start(opened)
+    start = learned_start(opened, CONFIG)
     assert start is not None
     assert is_valid(opened.surface, start)
     # far from the band, the learned uv are kept, up to one scale
@@ -128,7 +128,7 @@ def test_the_learned_uv_of_a_tube_are_valid_once_its_band_is_laid_out_anew(width
 def test_a_mirrored_map_is_turned_round() -> None:
     tube, uv = unrolled_tube(0.0)
     opened = open_along_seam(tube, np.arange(len(tube.faces)), uv * [-1.0, 1.0], CONFIG.seam)[1]
-    start = learned_start(opened)
+    start = learned_start(opened, CONFIG)
     assert start is not None
     assert is_valid(opened.surface, start)
 
@@ -137,9 +137,9 @@ def test_a_map_that_is_nonsense_is_no_start() -> None:
     tube, _ = unrolled_tube(0.0)
     rng = np.random.default_rng(0)
     opened = open_along_seam(tube, np.arange(len(tube.faces)), rng.normal(size=(len(tube.vertices), 2)), CONFIG.seam)[1]
-    assert learned_start(opened) is None
+    assert learned_start(opened, CONFIG) is None
     flat = opened._replace(uv=np.zeros_like(opened.uv), torn=np.zeros_like(opened.torn))
-    assert learned_start(flat) is None
+    assert learned_start(flat, CONFIG) is None
 
 
 def test_two_layers_in_uv_are_no_valid_map() -> None:

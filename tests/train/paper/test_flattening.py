@@ -40,7 +40,7 @@ def test_charts_share_a_torus_with_little_stretch() -> None:
     config = PaperConfig(mode="multi-chart", charts=6, steps=400, points=300, nets=PaperNets(hidden=64), device="cpu")
     surface = shape("torus", 48)
     networks = train_paper(
-        PaperInput(surface.vertices, vertex_normals(surface), surface.faces), config, lambda step, loss: None
+        PaperInput(surface.vertices, vertex_normals(surface), surface.faces), config, lambda _step, _loss: None
     )
     with torch.no_grad():
         logits, every = networks(torch.from_numpy(surface.vertices).float())

@@ -21,6 +21,7 @@ from flexpara.train.paper.losses import (
     eigenvalue_gap,
     nearest_gap,
     repulsion,
+    weighted_total,
 )
 
 if TYPE_CHECKING:
@@ -313,3 +314,16 @@ def test_a_one_hot_score_weighs_edges_as_the_subset_does() -> None:
     assert edge_score(score, edges).tolist() == [[1.0, 1.0, 0.5, 0.0]]
     inside = gap[0, :2].sum() + 0.5 * gap[0, 2]
     torch.testing.assert_close(len(edges) * weighted_mean(gap, edge_score(score, edges)), inside)
+
+
+# ── the sum ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+
+def test_the_total_weighs_each_term_by_its_name() -> None:
+    terms = {"cycle": torch.tensor(2.0), "wrap": torch.tensor(3.0)}
+    assert weighted_total(terms, {"wrap": 10.0, "cycle": 1.0, "unwrap": 5.0}).item() == 32.0
+
+
+def test_a_term_without_a_weight_is_no_silent_zero() -> None:
+    with pytest.raises(KeyError, match="cycel"):
+        weighted_total({"cycel": torch.tensor(2.0)}, {"cycle": 1.0})

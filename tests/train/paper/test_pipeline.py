@@ -14,6 +14,7 @@ from flexpara.runtime.mesh import Charts, Frame, Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FitConfig, TrainConfig
 from flexpara.train.paper.config import PaperConfig, PaperNets
+from flexpara.train.paper.finishing import GlobalFinishConfig
 from flexpara.train.paper.pipeline import (
     as_numpy,
     distortions,
@@ -24,6 +25,7 @@ from flexpara.train.paper.pipeline import (
     train_paper_surface,
     vertex_normals,
 )
+from flexpara.train.paper.seams import SeamConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -107,7 +109,7 @@ def test_charts_stand_side_by_side() -> None:
 
 def test_raw_figures_tell_the_seam_from_the_rest() -> None:
     tube = sample("tube", 48)
-    raw = raw_global(tube, unroll, PaperConfig())
+    raw = raw_global(tube, unroll, PaperConfig(), SeamConfig())
     assert raw["off_seam"]["conformal_mean"] < 0.02
     assert raw["off_seam"]["flipped"] < raw["all"]["flipped"] < 0.1  # where the band turns back, it is not steep yet
     assert raw["all"]["conformal_mean"] > 2.0 * raw["off_seam"]["conformal_mean"]
@@ -118,9 +120,16 @@ def test_raw_figures_tell_the_seam_from_the_rest() -> None:
 
 def test_a_map_without_a_seam_has_no_cut_points() -> None:
     sheet = sample("cloth", 32)
-    raw = raw_global(sheet, lambda xyz: (np.zeros((len(xyz), 1)), xyz[:, None, :2]), PaperConfig())
+    raw = raw_global(sheet, lambda xyz: (np.zeros((len(xyz), 1)), xyz[:, None, :2]), PaperConfig(), SeamConfig())
     assert raw["cut_points"] < 0.002  # of random samples, a few have their third neighbour 2 % of the box away
     assert raw["seam_faces"] == 0.0
+
+
+def test_raw_figures_are_those_of_the_seam_numbers_in_force() -> None:
+    tube = sample("tube", 48)
+    shares = [raw_global(tube, unroll, PaperConfig(), SeamConfig(torn=torn))["seam_faces"] for torn in (3.0, 1e9)]
+    assert shares[0] > 0.0
+    assert shares[1] == 0.0
 
 
 def test_raw_figures_of_charts_leave_out_the_faces_between_them() -> None:
@@ -136,7 +145,9 @@ def test_raw_figures_of_charts_leave_out_the_faces_between_them() -> None:
 
 def test_charts_that_nobody_takes_are_not_made() -> None:
     tube = sample("tube", 48)
-    found, report = finish_learned(tube, two_sides, PaperConfig(mode="multi-chart", charts=3), quiet, TrainConfig())
+    found, report = finish_learned(
+        tube, two_sides, PaperConfig(mode="multi-chart", charts=3), quiet, GlobalFinishConfig()
+    )
     assert len(found.pieces) <= 2
     assert len(report["raw"]["charts"]) == 2
     assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found.pieces])), np.arange(len(tube.faces)))
@@ -144,7 +155,7 @@ def test_charts_that_nobody_takes_are_not_made() -> None:
 
 def test_a_learned_tube_is_one_chart_whose_report_has_both() -> None:
     tube = sample("tube", 48)
-    found, report = finish_learned(tube, unroll, PaperConfig(), quiet, TrainConfig())
+    found, report = finish_learned(tube, unroll, PaperConfig(), quiet, GlobalFinishConfig())
     assert len(found.pieces) == 1
     assert report["components"][0]["charts"] == 1
     assert report["raw"]["off_seam"]["conformal_mean"] > 0.0

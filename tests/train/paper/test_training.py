@@ -219,7 +219,7 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
 
 
 def test_compiled_parts_are_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(torch, "compile", lambda function, dynamic: lambda *inputs: function(*inputs) + 1.0)
+    monkeypatch.setattr(torch, "compile", lambda function, **_: lambda *inputs: function(*inputs) + 1.0)
     networks, xyz = Run.begin(SMALL, surface_input("tube", 16), CPU).networks, torch.zeros(2, 3)
     assert isinstance(networks, GlobalNetworks)
     plain = networks.flatten(xyz)
