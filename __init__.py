@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .runtime import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.errors import FlexparaError
 
 if TYPE_CHECKING:

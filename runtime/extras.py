@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from .errors import FlexparaError, MissingDependencyError
+from .forks import refuse_fork_of_torch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,7 +16,12 @@ PACKAGE = "flexpara"
 
 @contextmanager
 def requires(extra: str) -> Iterator[None]:
-    """Around imports: a package of that extra which is absent becomes a MissingDependencyError that says what to do."""
+    """Around imports: a package of that extra which is absent becomes a MissingDependencyError that says what to do.
+
+    Raises: MissingDependencyError; FlexparaError where torch is asked for and would hang, see `forks`.
+    """
+    if extra == "train":
+        refuse_fork_of_torch()
     try:
         yield
     except FlexparaError:
