@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from . import train as train
     from .export.unwrapping import Unwrapped
     from .runtime.files import OutputFolder
-    from .runtime.io.cloud import CloudMesh, PointCloud
     from .runtime.io.meshfile import MeshLike
     from .runtime.io.meshfile import load as load
+    from .runtime.io.points.cloud import CloudMesh, PointCloud
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.options import Options, Outputs
     from .runtime.progress import Progress
@@ -73,7 +73,7 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[train] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
-    from .runtime.io.cloud import PointCloud
+    from .runtime.io.points.cloud import PointCloud
     from .runtime.options import Options, from_keywords
 
     options = from_keywords(Options, options, keywords)
@@ -85,9 +85,9 @@ def unwrap(
 
 def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
     """A mesh as an Asset, a file without faces as a PointCloud.  Raises: InputError when it is neither."""
-    from .runtime.io.cloud import PointCloud
-    from .runtime.io.cloudfile import is_cloud, load_cloud
     from .runtime.io.meshfile import load
+    from .runtime.io.points.cloud import PointCloud
+    from .runtime.io.points.cloudfile import is_cloud, load_cloud
 
     if isinstance(source, PointCloud):
         return source
@@ -167,7 +167,7 @@ class UnwrapResult:
         Raises: InputError for a mesh, whose uv are those of the atlas.
         """
         from .runtime.errors import InputError
-        from .runtime.io.cloud import point_uv
+        from .runtime.io.points.cloud import point_uv
 
         if self.cloud_mesh is None:
             raise InputError("point_uv of a mesh, expected a point cloud; use result.atlas")
@@ -246,8 +246,8 @@ class UnwrapResult:
 
     def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:
         """The user's points with their uv and chart, as .npz and, in place of the mesh, as .ply."""
-        from .runtime.io.cloudfile import write_cloud_npz
         from .runtime.io.ply.write import write_cloud_ply
+        from .runtime.io.points.cloudfile import write_cloud_npz
 
         uv, chart = self.point_uv()
         for name, write in zip(point_files(output.stem), (write_cloud_ply, write_cloud_npz), strict=True):

@@ -26,7 +26,7 @@ from .onnx import export_onnx
 from .raw import raw_onnx
 
 if TYPE_CHECKING:
-    from ..runtime.io.cloud import PointCloud
+    from ..runtime.io.points.cloud import PointCloud
     from ..runtime.mesh import Asset, Atlas, Charts
     from ..runtime.options import TrainOptions
     from ..runtime.progress import Clock

@@ -26,7 +26,7 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
         force: Overwrite that file.
     """
     from .files import OutputFolder, write_whole
-    from .io.pointfile import check_output, read_points, write_unwrapped
+    from .io.points.pointfile import check_output, read_points, write_unwrapped
     from .sessions.session import UnwrapSession
 
     check_output(output)

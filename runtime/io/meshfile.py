@@ -16,14 +16,14 @@ import numpy as np
 
 from ..errors import InputError, MeshError, MissingFileError, ShapeError
 from ..mesh import Asset
-from .cleaning import clean
-from .cloudfile import is_cloud
+from .clean.clean import clean
 from .colors import as_rgba
 from .gltf.scene import read_gltf
 from .obj.read import read_obj
 from .off import read_off
 from .pictures import read_in_folder
 from .ply.read import read_ply
+from .points.cloudfile import is_cloud
 from .rawmesh import RawMesh, unit_vectors
 from .stl import read_stl
 

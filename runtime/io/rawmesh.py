@@ -73,6 +73,18 @@ def check(raw: RawMesh) -> None:
         raise MeshError(f"coordinates reach {largest:.3g}, expected at most {LARGEST_DIAGONAL:g}; choose another unit")
 
 
+def with_vertices(part: RawMesh, chosen: NDArray[np.int64], faces: NDArray[np.int64]) -> RawMesh:
+    """The part with the vertices chosen, (m,) int64 of those it has (repeated ones are split), and faces into them."""
+    return replace(
+        part,
+        positions=part.positions[chosen],
+        faces=faces,
+        normals=None if part.normals is None else part.normals[chosen],
+        colors=None if part.colors is None else part.colors[chosen],
+        uv=None if part.uv is None else part.uv[chosen],
+    )
+
+
 def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
     """The part under a (4, 4) matrix for column vectors; a mirroring one turns the winding: outside stays outside."""
     linear = world[:3, :3]
@@ -105,15 +117,8 @@ def split_at_corners(
     first = np.concatenate([[True], differs])
     faces = np.zeros(len(vertex), dtype=np.int64)
     faces[order] = np.cumsum(first) - 1
-    source, own = vertex[order][first], value[order][first]
-    return replace(
-        part,
-        positions=part.positions[source],
-        faces=faces.reshape(-1, 3),
-        normals=None if part.normals is None else part.normals[source],
-        colors=own.astype(np.uint8) if uv is None else None if part.colors is None else part.colors[source],
-        uv=own.astype(np.float64) if uv is not None else None if part.uv is None else part.uv[source],
-    )
+    split, own = with_vertices(part, vertex[order][first], faces.reshape(-1, 3)), value[order][first]
+    return replace(split, colors=own.astype(np.uint8)) if uv is None else replace(split, uv=own.astype(np.float64))
 
 
 def merge(parts: Sequence[RawMesh]) -> RawMesh:

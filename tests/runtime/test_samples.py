@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError, MissingDependencyError
-from flexpara.runtime.io.cleaning import clean
+from flexpara.runtime.io.clean.clean import clean
 from flexpara.runtime.io.rawmesh import RawMesh
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import SAMPLES, make_sample

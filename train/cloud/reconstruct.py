@@ -17,7 +17,7 @@ import numpy as np
 from ...runtime.errors import MeshError
 from ...runtime.geometry.topology import components, split_non_manifold_vertices
 from ...runtime.geometry.triangles import corner_angles
-from ...runtime.io.cloud import CloudMesh, distinct_points, with_changes
+from ...runtime.io.points.cloud import CloudMesh, distinct_points, with_changes
 from ...runtime.mesh import Asset, Surface
 from .config import CloudConfig
 from .holes import hole_triangles
@@ -27,7 +27,7 @@ from .stars import star_candidates
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.io.cloud import DistinctPoints, PointCloud
+    from ...runtime.io.points.cloud import DistinctPoints, PointCloud
     from .stars import Candidates
 
 

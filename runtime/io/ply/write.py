@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cloud import check_uv
 from ..colors import source_colors
+from ..points.cloud import check_uv
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...mesh import Atlas
-    from ..cloud import PointCloud
+    from ..points.cloud import PointCloud
 
     Column = tuple[str, str, NDArray[Any]]
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.cleaning import clean, degenerate_faces, inconsistent_faces, weld_vertices
+from flexpara.runtime.io.clean.clean import clean
+from flexpara.runtime.io.clean.orient import inconsistent_faces
+from flexpara.runtime.io.clean.weld import degenerate_faces, weld_vertices
 from flexpara.runtime.io.rawmesh import RawMesh
 from flexpara.runtime.mesh import Asset
 from flexpara.runtime.samples import make_sample

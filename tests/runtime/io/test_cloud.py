@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError, ShapeError
-from flexpara.runtime.io.cloud import CloudMesh, cloud_from_arrays, distinct_points, point_uv, with_changes
+from flexpara.runtime.io.points.cloud import CloudMesh, cloud_from_arrays, distinct_points, point_uv, with_changes
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 
 POINTS = np.random.default_rng(1).normal(size=(8, 3))

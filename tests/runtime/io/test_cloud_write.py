@@ -9,9 +9,9 @@ import pytest
 import trimesh
 
 from flexpara.runtime.errors import ShapeError
-from flexpara.runtime.io.cloud import cloud_from_arrays
-from flexpara.runtime.io.cloudfile import is_cloud, load_cloud, write_cloud_npz
 from flexpara.runtime.io.ply.write import write_cloud_ply
+from flexpara.runtime.io.points.cloud import cloud_from_arrays
+from flexpara.runtime.io.points.cloudfile import is_cloud, load_cloud, write_cloud_npz
 
 RNG = np.random.default_rng(4)
 POINTS = RNG.normal(size=(6, 3))

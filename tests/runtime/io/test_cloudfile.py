@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from flexpara.runtime.errors import InputError, MissingFileError, ShapeError
-from flexpara.runtime.io.cloudfile import is_cloud, load_cloud
+from flexpara.runtime.io.points.cloudfile import is_cloud, load_cloud
 
 RNG = np.random.default_rng(3)
 POINTS = RNG.normal(size=(9, 3))

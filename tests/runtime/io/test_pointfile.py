@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from flexpara.runtime.errors import InputError, MissingFileError, ShapeError
-from flexpara.runtime.io.pointfile import check_output, read_points, write_unwrapped
+from flexpara.runtime.io.points.pointfile import check_output, read_points, write_unwrapped
 
 POINTS = np.random.default_rng(1).normal(size=(7, 3))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.cleaning import clean
+from flexpara.runtime.io.clean.clean import clean
 from flexpara.runtime.io.rawmesh import MAX_FACES, RawMesh, check, merge, split_at_corners, transformed
 from flexpara.runtime.material import Material
 from flexpara.runtime.samples import make_sample

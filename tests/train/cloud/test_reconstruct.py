@@ -13,7 +13,7 @@ from flexpara.runtime.errors import MeshError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.geometry.topology import boundary_loops, euler_characteristic, is_manifold
 from flexpara.runtime.geometry.triangles import corner_angles
-from flexpara.runtime.io.cloud import CloudMesh, PointCloud, cloud_from_arrays, point_uv
+from flexpara.runtime.io.points.cloud import CloudMesh, PointCloud, cloud_from_arrays, point_uv
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.pack.packing import pack
 from flexpara.runtime.samples import make_sample

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, ShapeError
-from ..geometry.rows import first_of_each
-from .cleaning import SMALLEST_DIAGONAL, weld_vertices
-from .colors import as_rgba
-from .rawmesh import LARGEST_DIAGONAL, unit_vectors
+from ...errors import InputError, ShapeError
+from ...geometry.rows import first_of_each
+from ..clean.weld import SMALLEST_DIAGONAL, weld_vertices
+from ..colors import as_rgba
+from ..rawmesh import LARGEST_DIAGONAL, unit_vectors
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from ..mesh import Asset, Atlas
+    from ...mesh import Asset, Atlas
 
 FEWEST_POINTS = 4
 
@@ -106,7 +106,7 @@ def cloud_from_arrays(
 
 
 def distinct_points(cloud: PointCloud) -> DistinctPoints:
-    """The cloud without points that repeat an earlier one (equal, or closer than `cleaning.WELD_TOLERANCE`).
+    """The cloud without points that repeat an earlier one (equal, or closer than `weld.WELD_TOLERANCE`).
 
     Of repeated points the first known normal in their order stays.
     """

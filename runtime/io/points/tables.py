@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from .text import is_number, lines_of, number_table
+from ...errors import InputError
+from ..text import is_number, lines_of, number_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, MissingFileError, ShapeError
+from ...errors import InputError, MissingFileError, ShapeError
+from ..ply.header import FACES, MAX_HEADER, ply_header
+from ..ply.read import read_ply_points
 from .cloud import PointCloud, check_uv, cloud_from_arrays
-from .ply.header import FACES, MAX_HEADER, ply_header
-from .ply.read import read_ply_points
 from .tables import MAX_BYTES, TEXT, read_table
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, MissingFileError, ShapeError
-from .ply.read import read_ply_points
+from ...errors import InputError, MissingFileError, ShapeError
+from ..ply.read import read_ply_points
 from .tables import TEXT, read_table
 
 if TYPE_CHECKING:

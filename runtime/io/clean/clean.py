@@ -1,0 +1,117 @@
+"""Raw triangles → Asset: weld, leave out what is no triangle, orient.
+
+n file vertices · v surface vertices · f faces.  Positions are float64 in source units.  Faces that stay keep their
+order and their first corner; a turned face swaps its corners 1 and 2.  Every change is counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import MeshError
+from ...geometry.normals import smooth_normals
+from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
+from ...mesh import Asset, Surface
+from ..rawmesh import RawMesh, check, with_vertices
+from .orient import connected_labels, face_edges, inconsistent_faces
+from .weld import degenerate_faces, longest_edges, weld_vertices
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
+    """Weld, leave out degenerate faces and unused vertices, leave out duplicate faces, orient.
+
+    Raises: MeshError for a mesh that is empty, not finite, out of range, too large, or degenerate in all its faces.
+    """
+    check(raw)
+    used, faces = np.unique(raw.faces, return_inverse=True)
+    part = with_vertices(raw, used, faces.reshape(-1, 3))
+    weld = weld_vertices(part.positions, longest_edges(part.positions, part.faces))
+    proper = ~degenerate_faces(part.positions[first_of_each(weld)], weld[part.faces])
+    if not proper.any():
+        raise MeshError(
+            f"all {len(proper)} faces are degenerate (repeated corners, no area), expected triangles; export it again"
+        )
+    kept = np.flatnonzero(proper)
+    welded = np.unique(weld[part.faces[kept]], return_inverse=True)[1].reshape(-1, 3)
+    single = np.zeros(len(kept), dtype=np.bool_)
+    single[first_of_each(equal_rows(np.sort(welded, axis=1)))] = True
+    kept, sheets = kept[single], welded[single]
+    flip = inconsistent_faces(sheets)
+    counts = {
+        "unreferenced_vertices": len(raw.positions) - len(np.unique(part.faces[kept])),
+        "welded_vertices": len(weld) - len(first_of_each(weld)),
+        "degenerate_faces": int(np.count_nonzero(~proper)),
+        "duplicate_faces": int(np.count_nonzero(~single)),
+        "flipped_faces": int(np.count_nonzero(flip)),
+    }
+    whole = replace(
+        part,
+        faces=_turned(part.faces[kept], flip),
+        face_material=None if part.face_material is None else part.face_material[kept],
+        changes={**part.changes, **counts},
+    )
+    return _asset(whole, _turned(sheets, flip), stem=stem, sha256=sha256)
+
+
+def _turned(faces: NDArray[np.int64], flip: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.where(flip[:, None], faces[:, [0, 2, 1]], faces)
+
+
+def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -> Asset:
+    """The asset; sheets (f, 3) are its faces as surface vertices.
+
+    A file vertex that belongs to several sheets is split: the first stays in its place, the others go to the end.
+    """
+    pair = equal_rows(np.stack([raw.faces.ravel(), sheets.ravel()], axis=1))
+    first = first_of_each(pair)
+    vertex = raw.faces.ravel()[first]
+    _, earliest = np.unique(vertex[np.argsort(first)], return_index=True)
+    later = np.ones(len(first), dtype=np.bool_)
+    later[np.argsort(first)[earliest]] = False
+    order = np.lexsort((first, vertex, later))
+    number = np.zeros(len(order), dtype=np.int64)
+    number[order] = np.arange(len(order))
+    part = with_vertices(raw, vertex[order], number[pair].reshape(-1, 3))
+    weld = by_first_appearance(sheets.ravel()[first][order])
+    surface = Surface(vertices=part.positions[first_of_each(weld)], faces=weld[part.faces])
+    normals, repaired = _repaired_normals(part.normals, surface, weld)
+    counts = {**raw.changes, "repaired_normals": repaired, **_edge_counts(surface.faces)}
+    return Asset(
+        positions=part.positions,
+        faces=part.faces,
+        weld=weld,
+        surface=surface,
+        normals=normals,
+        colors=part.colors,
+        uv=part.uv,
+        materials=part.materials,
+        face_material=part.face_material,
+        changes={name: count for name, count in counts.items() if count},
+        sha256=sha256,
+        stem=stem,
+    )
+
+
+def _repaired_normals(
+    normals: NDArray[np.float64] | None, surface: Surface, weld: NDArray[np.int64]
+) -> tuple[NDArray[np.float64] | None, int]:
+    """Normals, those that are zero or not finite replaced by the surface's own, and how many these were."""
+    if normals is None:
+        return None, 0
+    broken = np.logical_not(np.isfinite(normals).all(axis=1) & normals.any(axis=1))
+    if not broken.any():
+        return normals, 0
+    return np.where(broken[:, None], smooth_normals(surface)[weld], normals), int(np.count_nonzero(broken))
+
+
+def _edge_counts(faces: NDArray[np.int64]) -> dict[str, int]:
+    """Edges with three faces or more, and pieces joined by edges where there are several."""
+    edges = face_edges(faces)
+    components = int(connected_labels(edges.links, len(faces)).max()) + 1
+    return {"non_manifold_edges": edges.non_manifold, "components": components if components > 1 else 0}
