@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from . import export as export
     from . import runtime as runtime
     from . import train as train
-    from .export.unwrapping import Unwrapped
+    from .export.assemble import Unwrapped
     from .runtime.files import OutputFolder
     from .runtime.io.meshfile import MeshLike
     from .runtime.io.meshfile import load as load
@@ -104,7 +104,8 @@ def unwrap_asset(
     from .runtime.progress import Clock
 
     with requires("train"):
-        from .export.unwrapping import assemble, train_asset
+        from .export.assemble import assemble
+        from .train.presets import train_asset
 
     clock = Clock(progress)
     trained = train_asset(asset, options, clock, keep)
@@ -122,8 +123,9 @@ def unwrap_cloud(
     from .runtime.progress import Clock
 
     with requires("train"):
-        from .export.unwrapping import assemble, train_asset
+        from .export.assemble import assemble
         from .train.cloud.reconstruct import reconstruct
+        from .train.presets import train_asset
 
     clock = Clock(progress)
     with clock.stage("triangulate"):
@@ -222,7 +224,7 @@ class UnwrapResult:
         """As `save`, into an open OutputFolder."""
         from .bake.checks import check_outputs, chosen_maps
         from .bake.output import write_outputs
-        from .export.unwrapping import invert
+        from .export.assemble import invert
         from .runtime.progress import Clock
 
         outputs = outputs.for_asset(self.asset)

@@ -147,7 +147,7 @@ def train(
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         folder.check([name, folder.report_name])
         with requires("train"):
-            from .export.unwrapping import train_asset
+            from .train.presets import train_asset
             from .train.saved import to_bytes
         with progress_bars(quiet=console.quiet) as progress:
             trained = train_asset(asset, options, Clock(progress))
@@ -189,7 +189,7 @@ def export(
         outputs = outputs.for_asset(asset)
         check_outputs(folder, outputs, chosen_maps(outputs))
         with requires("train"):
-            from .export.unwrapping import assemble
+            from .export.assemble import assemble
             from .train.saved import read_trained
         with progress_bars(quiet=console.quiet) as progress:
             found = assemble(asset, read_trained(trained, asset), Clock(progress), size=options.size, padding=margin)

@@ -9,40 +9,40 @@ scattered back.  With eight patches that is four times as fast in onnxruntime as
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from torch import nn
 
-from ..runtime.errors import MissingFileError, ShapeError
-from ..runtime.files import replace_file
-from ..runtime.sessions.bundle import METADATA_KEY
+from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
 from .graph import UnwrapGraph, chart_membership, fold_frame
 from .lowering import Lowering, Value, cut_to_patch, is_per_patch, trace
 from .metadata import Provenance, bundle_metadata
 from .parity import ParityReport, ParitySpec, probe_points, prove_parity
+from .proven import FileKind, check_folder, frozen_copy, write_proven
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from torch import fx
+    from torch import fx, nn
 
     from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
+    from .builder import Ends
+
+
+INPUTS: Ends = {"points": ("float32", ["n", 3])}
+OUTPUTS: Ends = {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"]), "score": ("float32", ["n"])}
 
 
 @dataclass(frozen=True)
 class ExportSpec:
-    """What kind of file is written."""
+    """How a map is written."""
 
-    opset: int = 18
-    """Operator set of the default domain."""
-    ir_version: int = 8
-    """ONNX IR version that goes with opset 18: loads in onnxruntime 1.14 and later."""
+    kind: FileKind = field(default_factory=FileKind)
+    """Which onnxruntime can read it."""
     routed: bool = True
     """Run each point through its own patch's network only; False: all patches, then the choice (fixed shapes)."""
     parity: ParitySpec = field(default_factory=ParitySpec)
@@ -79,14 +79,12 @@ def export_onnx(
         FlexparaError: the model uses an operation that lowering.py does not know.
     """
     spec = spec or ExportSpec()
-    if not path.parent.is_dir():
-        raise MissingFileError(f"{path.parent}: no such folder, expected one to write {path.name} to; create it first")
+    check_folder(path)
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
     content = build_model(model, facts, spec)
     points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
-    report = prove_parity(UnwrapGraph(frozen_copy(model), facts), content, points, spec.parity)
-    replace_file(path, content)
-    return report
+    graph = UnwrapGraph(frozen_copy(model), facts)
+    return write_proven(path, content, lambda content: prove_parity(graph, content, points, spec.parity))
 
 
 def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) -> bytes:
@@ -96,19 +94,7 @@ def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) ->
     _check_shapes(frozen, metadata.patch_count)
     with torch.no_grad():
         _write_graph(builder, trace(frozen), metadata, spec)
-    return builder.serialize(
-        {"points": ("float32", ["n", 3])},
-        {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"]), "score": ("float32", ["n"])},
-        opset=spec.opset,
-        ir_version=spec.ir_version,
-        producer=(metadata.producer_name, metadata.producer_version),
-        metadata={METADATA_KEY: metadata.to_json()},
-    )
-
-
-def frozen_copy(model: nn.Module) -> nn.Module:
-    """A float32 copy on the CPU, in evaluation mode, without gradients."""
-    return copy.deepcopy(model).to("cpu", torch.float32).eval().requires_grad_(False)
+    return spec.kind.serialize(builder, INPUTS, OUTPUTS, metadata, metadata.to_json(), "unwrap")
 
 
 def _check_shapes(model: nn.Module, patches: int) -> None:

@@ -17,16 +17,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..runtime.errors import MissingFileError
-from ..runtime.files import replace_file
-from ..runtime.sessions.bundle import METADATA_KEY
 from ..runtime.sessions.wrapsession import wrap_json
 from ..train.deploy.fit_wrap import patch_table
 from .builder import GraphBuilder
 from .graph import fold_frame
 from .lowering import Lowering, Value, cut_to_patch, trace
 from .metadata import Provenance, bundle_metadata
-from .onnx import frozen_copy
+from .proven import FileKind, check_folder, frozen_copy, write_proven
 from .wrapgraph import (
     WrapGraph,
     WrapParityReport,
@@ -45,16 +42,19 @@ if TYPE_CHECKING:
 
     from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
+    from .builder import Ends
+
+
+INPUTS: Ends = {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"])}
+OUTPUTS: Ends = {"points": ("float32", ["n", 3]), "normals": ("float32", ["n", 3])}
 
 
 @dataclass(frozen=True)
 class WrapSpec:
-    """What kind of file is written."""
+    """How an inverse is written."""
 
-    opset: int = 18
-    """Operator set of the default domain."""
-    ir_version: int = 8
-    """ONNX IR version that goes with opset 18: loads in onnxruntime 1.14 and later."""
+    kind: FileKind = field(default_factory=FileKind)
+    """Which onnxruntime can read it."""
     parity: WrapParitySpec = field(default_factory=WrapParitySpec)
     """Where and how closely torch and onnxruntime must agree."""
 
@@ -90,14 +90,12 @@ def export_wrap(
         FlexparaError: the model uses an operation that lowering.py does not know.
     """
     spec = spec or WrapSpec()
-    if not path.parent.is_dir():
-        raise MissingFileError(f"{path.parent}: no such folder, expected one to write {path.name} to; create it first")
+    check_folder(path)
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
     content = build_inverse(model, facts, spec)
     probes = probe_uv(atlas, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
-    report = prove_inverse(WrapGraph(frozen_copy(model), facts), content, probes, spec.parity)
-    replace_file(path, content)
-    return report
+    graph = WrapGraph(frozen_copy(model), facts)
+    return write_proven(path, content, lambda content: prove_inverse(graph, content, probes, spec.parity))
 
 
 def build_inverse(model: nn.Module, metadata: BundleMetadata, spec: WrapSpec) -> bytes:
@@ -106,15 +104,7 @@ def build_inverse(model: nn.Module, metadata: BundleMetadata, spec: WrapSpec) ->
     with torch.no_grad():
         check_shapes(frozen, metadata)
         _write_graph(builder, frozen, metadata)
-    return builder.serialize(
-        {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"])},
-        {"points": ("float32", ["n", 3]), "normals": ("float32", ["n", 3])},
-        opset=spec.opset,
-        ir_version=spec.ir_version,
-        producer=(metadata.producer_name, metadata.producer_version),
-        metadata={METADATA_KEY: wrap_json(metadata)},
-        name="wrap",
-    )
+    return spec.kind.serialize(builder, INPUTS, OUTPUTS, metadata, wrap_json(metadata), "wrap")
 
 
 class _Wrap(nn.Module):

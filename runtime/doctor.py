@@ -11,6 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .. import __version__
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -35,7 +37,7 @@ class Finding:
 
 def packages() -> Iterator[Finding]:
     """This package and everything that its extras for users ask for, as its metadata lists them."""
-    yield Finding(PACKAGE, f"{metadata.version(PACKAGE)} on Python {sys.version.split()[0]}")
+    yield Finding(PACKAGE, f"{__version__} on Python {sys.version.split()[0]}")
     for requirement in metadata.requires(PACKAGE) or []:
         name = re.split(r"[^\w.-]", requirement)[0]
         extra = "".join(re.findall(r"extra == \"(\w+)\"", requirement))

@@ -47,8 +47,8 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     Returns the surfaces it was asked to train, for tests of what happens before and after training.
     """
     torch = pytest.importorskip("torch")
-    from flexpara.export import unwrapping
     from flexpara.runtime.mesh import Charts, Frame
+    from flexpara.train import presets
     from flexpara.train.config import NetConfig, TrainConfig
     from flexpara.train.learn.networks import AtlasNetworks
 
@@ -68,5 +68,5 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
             paper=None,
         )
 
-    monkeypatch.setattr(unwrapping, "train", train)
+    monkeypatch.setattr(presets, "train", train)
     return trained

@@ -18,7 +18,6 @@ NOT_FOR_RUNTIME = (
     "glcontext",
     "OpenGL",
     "onnx",
-    "onnxscript",
     "OpenImageIO",
     "igl",
     "safetensors",

@@ -6,7 +6,7 @@ surface (source units) → unit ball → joint training → finishing → patche
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -25,15 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from torch import nn
 
+    from ..runtime.progress import Progress
     from .config import PatchConfig, TrainConfig
-
-
-class Progress(Protocol):
-    """What is told how far training is."""
-
-    def __call__(self, stage: str, step: int, steps: int, loss: float | None = None) -> None:
-        """``step`` of ``steps`` of a stage are done."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

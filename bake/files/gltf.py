@@ -8,11 +8,11 @@ Positions are float32 about a node translation where float32 alone would lose di
 from __future__ import annotations
 
 import json
-from importlib import metadata as packages
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ... import __version__
 from ...runtime.errors import ShapeError
 from ..color import linear_from_srgb
 from ..maps.tangents import unit, vertex_tangents
@@ -64,7 +64,7 @@ def glb_bytes(
     """
     _check(atlas, asset)
     buffer = Buffer()
-    document = gl.GLTF2(asset=gl.Asset(version="2.0", generator=_generator()))
+    document = gl.GLTF2(asset=gl.Asset(version="2.0", generator=f"flexpara {__version__}"))
     if metadata:
         document.asset.extras = {"flexpara": json.loads(json.dumps(metadata))}
     material = add_material(document, buffer, asset, textures)
@@ -87,14 +87,6 @@ def _check(atlas: Atlas, asset: Asset) -> None:
         raise ShapeError(f"atlas of {len(faces)} faces, {count} vertices: expected a face or more, indices in range")
     if int(atlas.source_vertex.max()) >= len(asset.positions):
         raise ShapeError("atlas.source_vertex points beyond the asset's vertices; pass the asset it was made from")
-
-
-def _generator() -> str:
-    """Producer's name and version."""
-    try:
-        return f"flexpara {packages.version('flexpara')}"
-    except packages.PackageNotFoundError:
-        return "flexpara"
 
 
 def _add_mesh(document: gl.GLTF2, buffer: Buffer, atlas: Atlas, asset: Asset, material: gl.Material) -> None:

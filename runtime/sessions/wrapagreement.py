@@ -1,4 +1,4 @@
-"""How well an exported inverse (uv → point) agrees with the surface it was fitted to; and the normals it answers with.
+"""How well an exported inverse (uv → point) agrees with the surface it was fitted to.
 
 n points · f faces.  Positions in source units; errors relative to the surface's bounding-sphere radius; angles in
 radians.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..geometry.triangles import corner_angles
+from ..geometry.normals import corner_normals, interpolated_normals
 from ..mesh import Frame
 
 if TYPE_CHECKING:
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from ..mesh import Atlas, Surface
     from .wrapsession import Wrapped
-
-CREASE = np.deg2rad(40.0)
-"""Faces at a vertex whose normals differ by more don't share a vertex normal there."""
 
 
 class InverseMap(Protocol):
@@ -73,40 +70,3 @@ def inverse_agreement(
         normal_mean=float(np.arccos(cosine).mean()),
         points=count,
     )
-
-
-def corner_normals(surface: Surface, *, crease: float = CREASE) -> NDArray[np.float64]:
-    """(f, 3, 3) float64 unit normals of the corners of faces: smooth across edges, sharp along creases.
-
-    A corner averages the faces around its vertex whose normals lie within ``crease`` (radians) of its own face's,
-    weighted by their angle there.
-    """
-    normal = surface.face_normals()
-    weighted = (normal[:, None, :] * corner_angles(surface.triangles)[:, :, None]).reshape(-1, 3)
-    vertex = surface.faces.reshape(-1)
-    order = np.argsort(vertex, kind="stable")
-    valence = np.bincount(vertex, minlength=len(surface.vertices))
-    first = np.cumsum(valence) - valence
-    count = valence[vertex]
-    corner = np.repeat(np.arange(len(vertex)), count)
-    step = np.arange(len(corner)) - np.repeat(np.cumsum(count) - count, count)
-    other = order[first[vertex[corner]] + step]
-    alike = np.einsum("nx,nx->n", normal[corner // 3], normal[other // 3]) > np.cos(crease)
-    corner, other = corner[alike], other[alike]
-    total = np.zeros((len(vertex), 3))
-    for axis in range(3):
-        total[:, axis] = np.bincount(corner, weighted[other, axis], len(vertex))
-    return unit(total, normal[np.arange(len(vertex)) // 3]).reshape(-1, 3, 3)
-
-
-def interpolated_normals(
-    corners: NDArray[np.float64], face: NDArray[np.int64], barycentric: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n, 3) float64 unit normals inside faces (n,), from those of their corners (f, 3, 3)."""
-    return unit(np.einsum("nc,ncx->nx", barycentric, corners[face]), corners[face, 0])
-
-
-def unit(vectors: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vectors (n, 3) at unit length; ``otherwise`` (n, 3) where they vanish."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), otherwise)

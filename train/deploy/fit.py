@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Charts, Surface
+    from ...runtime.progress import Progress
     from ..config import FitConfig, NetConfig
-    from ..pipeline import Progress
 
 
 class PatchSamples(NamedTuple):

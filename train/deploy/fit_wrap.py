@@ -18,9 +18,9 @@ import torch
 from torch import Tensor, nn
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.normals import corner_normals, interpolated_normals
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
-from ...runtime.sessions.wrapagreement import corner_normals, interpolated_normals
 from ..config import WrapConfig
 from ..sampling import sample_surface
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Charts
-    from ..pipeline import Progress
+    from ...runtime.progress import Progress
 
 
 class SineNets(nn.Module):

@@ -20,7 +20,7 @@ from ...runtime.mesh import Charts, Frame, Surface
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
 from ..finish.finish import finish
-from ..pipeline import Progress, Trained, as_charts, in_turn
+from ..pipeline import Trained, as_charts, in_turn
 from ..sampling import sample_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...runtime.progress import Progress
     from ..finish.finish import Finished
     from .checkpoint import Checkpoints
     from .config import PaperConfig

@@ -1,4 +1,4 @@
-"""Normals and tangents: a sphere, a cube, and tangent frames at the poles."""
+"""Normals of vertices and corners on solids and roofs, and tangent frames at the poles."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from flexpara.runtime.geometry.normals import smooth_normals, tangent_frames
+from flexpara.runtime.geometry.normals import corner_normals, interpolated_normals, smooth_normals, tangent_frames
 from flexpara.runtime.mesh import Surface
+from flexpara.runtime.samples import make_sample
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,3 +58,43 @@ def test_the_tangents_at_a_pole_are_the_axes(z: float) -> None:
     first, second = tangent_frames(np.array([[0.0, 0.0, z]]))
     np.testing.assert_allclose(first, [[1.0, 0.0, 0.0]])
     np.testing.assert_allclose(second, [[0.0, z, 0.0]])
+
+
+def test_one_triangle_has_its_own_normal_at_each_corner() -> None:
+    surface = Surface(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0, 1, 2]]))
+    assert np.array_equal(corner_normals(surface), np.broadcast_to([0.0, 0.0, 1.0], (1, 3, 3)))
+
+
+def roof(slope: float) -> Surface:
+    """Two triangles that meet at the y axis and fall by ``slope`` radians on both sides."""
+    fall = [np.cos(slope), 0.0, -np.sin(slope)]
+    vertices = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0], fall, [-fall[0], 0.0, fall[2]]])
+    return Surface(vertices, np.array([[0, 2, 1], [0, 1, 3]]))
+
+
+def test_a_low_roof_is_round_at_its_ridge_and_a_steep_one_is_sharp() -> None:
+    low, steep = roof(np.deg2rad(15.0)), roof(np.deg2rad(25.0))
+    assert np.allclose(corner_normals(low)[0, [0, 2]], [0.0, 0.0, 1.0])
+    assert np.allclose(corner_normals(low)[0, 1], low.face_normals()[0])
+    assert np.allclose(corner_normals(steep), steep.face_normals()[:, None])
+    assert np.allclose(corner_normals(steep, crease=np.deg2rad(60.0))[1, [0, 1]], [0.0, 0.0, 1.0])
+
+
+def test_a_cube_keeps_its_edges() -> None:
+    surface = Surface(*make_sample("cube", resolution=8))
+    assert np.allclose(corner_normals(surface), surface.face_normals()[:, None])
+
+
+def test_a_sphere_is_round() -> None:
+    surface = Surface(*make_sample("sphere", resolution=64))
+    radial = surface.triangles / np.linalg.norm(surface.triangles, axis=2, keepdims=True)
+    assert np.abs(corner_normals(surface) - radial).max() < 0.01
+
+
+def test_normals_inside_a_face_are_unit_and_those_of_its_corners_at_its_corners() -> None:
+    surface = Surface(*make_sample("sphere", resolution=16))
+    corners = corner_normals(surface)
+    face = np.arange(len(surface.faces))
+    inside = interpolated_normals(corners, face, np.random.default_rng(0).dirichlet(np.ones(3), size=len(face)))
+    assert np.allclose(np.linalg.norm(inside, axis=1), 1.0)
+    assert np.allclose(interpolated_normals(corners, face, np.tile([0.0, 1.0, 0.0], (len(face), 1))), corners[:, 1])

@@ -1,39 +1,32 @@
-"""From a mesh to everything that is written about it: train, finish, pack, measure, export.
+"""From what was trained to everything that is written about a mesh: pack, measure, export.
 
-`train_asset` and `assemble` are the two halves: what is trained may be kept on disk between them (train/saved.py).
+The other half of an unwrap is train/presets.py; what is trained may be kept on disk between them (train/saved.py).
 Positions in source units, uv in [0, 1]² of the atlas, sizes in texels.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..runtime.geometry.metrics import measure
-from ..runtime.mesh import Frame, Surface
+from ..runtime.mesh import Surface
 from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
-from ..train.config import TrainConfig
-from ..train.paper.config import Ablation, PaperConfig
-from ..train.pipeline import train
 from .metadata import Provenance
 from .onnx import export_onnx
 from .raw import raw_onnx
 
 if TYPE_CHECKING:
-    from ..runtime.io.points.cloud import PointCloud
-    from ..runtime.mesh import Asset, Atlas, Charts
-    from ..runtime.options import TrainOptions
+    from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.progress import Clock
     from ..train.learn.networks import AtlasNetworks
     from ..train.pipeline import Trained
-
-    Keep = tuple[Path, int]
 
 REPORT_VERSION = 1
 
@@ -55,34 +48,6 @@ class Unwrapped:
     onnx: bytes = field(repr=False)
     report: dict[str, Any] = field(repr=False)
     paper: bytes | None = field(default=None, repr=False)
-
-
-def train_asset(
-    asset: Asset, options: TrainOptions, clock: Clock, keep: Keep | None = None, cloud: PointCloud | None = None
-) -> Trained:
-    """Charts and networks by the preset asked for.
-
-    Args:
-        asset: what is charted.
-        options: preset and what it needs.
-        clock: told the stages.
-        keep: where and how often preset paper keeps checkpoints.
-        cloud: the points that the asset's triangles were laid over: preset paper is then trained on points alone.
-
-    Raises: InputError for checkpoints of another run; FinishError (a defect).
-    """
-    if options.preset != "paper":
-        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
-    from ..train.paper.batches import PaperInput
-    from ..train.paper.checkpoint import Checkpoints
-    from ..train.paper.pipeline import train_paper_surface
-
-    samples = None
-    if cloud is not None:
-        ball = Frame.of(asset.surface.vertices).apply(asset.surface.vertices)
-        samples = PaperInput(ball, None if cloud.normals is None else asset.normals)
-    checkpoints = None if keep is None else Checkpoints(*keep)
-    return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints, samples=samples)
 
 
 def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding: int) -> Unwrapped:
@@ -116,30 +81,6 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
-
-
-def paper_config(options: TrainOptions) -> PaperConfig:
-    """The settings of preset paper that these options ask for."""
-    plain = PaperConfig()
-    names = options.ablation
-    return replace(
-        plain,
-        mode=options.mode,
-        charts=options.charts,
-        seed=options.seed,
-        steps=options.steps or plain.steps,
-        points=options.points or plain.points,
-        dtype=options.precision,
-        nets=replace(plain.nets, hidden=options.width or plain.nets.hidden),
-        ablation=Ablation(
-            triangle="no-triangle" not in names,
-            differential="no-differential" not in names,
-            upper="no-upper" not in names,
-            lower="no-lower" not in names,
-            chart_bidirectional="bidirectional" in names,
-            chart_differential="chart-differential" in names,
-        ),
-    )
 
 
 def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[str, Any]]:

@@ -1,0 +1,77 @@
+"""The presets: a mesh and what a user asks for → charts and networks.   Positions in source units.
+
+"fast" is pipeline.train; "paper" trains as published (Zhao et al. 2025) and finishes what was learned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..runtime.mesh import Frame
+from .config import TrainConfig
+from .paper.config import Ablation, PaperConfig
+from .pipeline import train
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..runtime.io.points.cloud import PointCloud
+    from ..runtime.mesh import Asset
+    from ..runtime.options import TrainOptions
+    from ..runtime.progress import Clock
+    from .pipeline import Trained
+
+    Keep = tuple[Path, int]
+
+
+def train_asset(
+    asset: Asset, options: TrainOptions, clock: Clock, keep: Keep | None = None, cloud: PointCloud | None = None
+) -> Trained:
+    """Charts and networks by the preset asked for.
+
+    Args:
+        asset: what is charted.
+        options: preset and what it needs.
+        clock: told the stages.
+        keep: where and how often preset paper keeps checkpoints.
+        cloud: the points that the asset's triangles were laid over: preset paper is then trained on points alone.
+
+    Raises: InputError for checkpoints of another run; FinishError (a defect).
+    """
+    if options.preset != "paper":
+        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
+    from .paper.batches import PaperInput
+    from .paper.checkpoint import Checkpoints
+    from .paper.pipeline import train_paper_surface
+
+    samples = None
+    if cloud is not None:
+        ball = Frame.of(asset.surface.vertices).apply(asset.surface.vertices)
+        samples = PaperInput(ball, None if cloud.normals is None else asset.normals)
+    checkpoints = None if keep is None else Checkpoints(*keep)
+    return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints, samples=samples)
+
+
+def paper_config(options: TrainOptions) -> PaperConfig:
+    """The settings of preset paper that these options ask for."""
+    plain = PaperConfig()
+    names = options.ablation
+    return replace(
+        plain,
+        mode=options.mode,
+        charts=options.charts,
+        seed=options.seed,
+        steps=options.steps or plain.steps,
+        points=options.points or plain.points,
+        dtype=options.precision,
+        nets=replace(plain.nets, hidden=options.width or plain.nets.hidden),
+        ablation=Ablation(
+            triangle="no-triangle" not in names,
+            differential="no-differential" not in names,
+            upper="no-upper" not in names,
+            lower="no-lower" not in names,
+            chart_bidirectional="bidirectional" in names,
+            chart_differential="chart-differential" in names,
+        ),
+    )
