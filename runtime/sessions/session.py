@@ -38,7 +38,7 @@ FAR = 1e6
 
 Points = NDArray[np.float32] | NDArray[np.float64] | NDArray[np.float32 | np.float64]
 
-_LOAD_ERRORS = (Fail, InvalidArgument, InvalidGraph, InvalidProtobuf, OrtNotImplemented, RuntimeException)
+_ONNX_ERRORS = (Fail, InvalidArgument, InvalidGraph, InvalidProtobuf, OrtNotImplemented, RuntimeException)
 _REMEDY = "pass the .onnx file that flexpara unwrap wrote"
 
 
@@ -64,6 +64,23 @@ class Opened(NamedTuple):
     session: onnxruntime.InferenceSession
     metadata: BundleMetadata
     zero: onnxruntime.OrtValue
+    path: Path
+
+    def run(self, outputs: Sequence[str], feed: Mapping[str, NDArray[np.generic]]) -> list[NDArray[np.generic]]:
+        """The outputs, every number finite.  Raises: BundleError where a damaged model can't answer so."""
+        try:
+            found = [np.asarray(output) for output in self.session.run(list(outputs), dict(feed))]
+        except _ONNX_ERRORS as error:
+            raise BundleError(
+                f"{self.path}: the model does not run, expected an answer; the file is damaged: {_REMEDY}"
+            ) from error
+        for name, values in zip(outputs, found, strict=True):
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                raise BundleError(
+                    f"{self.path}: the model answers {name} = NaN or infinite, expected finite numbers; the file is "
+                    f"damaged: {_REMEDY}"
+                )
+        return found
 
 
 def open_bundle(
@@ -86,7 +103,7 @@ def open_bundle(
     metadata = _read_metadata(session, path)
     _check_signature(session, path, inputs, outputs)
     _check_used(session, providers)
-    return Opened(session, metadata, zero)
+    return Opened(session, metadata, zero, path)
 
 
 class UnwrapSession:
@@ -136,6 +153,7 @@ class UnwrapSession:
         Raises:
             ShapeError: another shape or dtype.
             InputError: NaN, infinite, or absurdly far from the surface.
+            BundleError: the file is damaged in a way that only its answers show.
         """
         points = _checked_points(points)
         n = len(points)
@@ -160,8 +178,7 @@ class UnwrapSession:
             found = f"point {start + first} = {points[first].tolist()}"
             expected = f"points near the surface (centre {frame.centre}, radius {frame.scale:.6g})"
             raise InputError(f"{found}, expected {expected}; use the units and the placement of the source file")
-        found = self._opened.session.run(list(OUTPUTS), {"points": centred.astype(np.float32)})
-        return [np.asarray(output) for output in found]
+        return self._opened.run(list(OUTPUTS), {"points": centred.astype(np.float32)})
 
 
 def checked_chunk(chunk: int) -> int:
@@ -205,10 +222,9 @@ def _load(
     for name, value in replaced.items():
         options.add_initializer(name, value)
     try:
-        return onnxruntime.InferenceSession(path, options, providers=list(providers))
-    except _LOAD_ERRORS as error:
-        reason = str(error).splitlines()[0]
-        raise BundleError(f"{path}: no usable ONNX model ({reason}), expected an exported file; {_REMEDY}") from error
+        return onnxruntime.InferenceSession(path, options, providers=list(providers), enable_fallback=0)
+    except (*_ONNX_ERRORS, UnicodeDecodeError) as error:
+        raise BundleError(f"{path}: no usable ONNX model, expected an exported file; {_REMEDY}") from error
 
 
 def _read_metadata(session: onnxruntime.InferenceSession, path: Path) -> BundleMetadata:

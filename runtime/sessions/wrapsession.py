@@ -107,9 +107,8 @@ class WrapSession:
         for start in range(0, n, self._chunk):
             rows = slice(start, start + self._chunk)
             feed = {"uv": uv[rows].astype(np.float32), "chart": chart[rows].astype(np.int64)}
-            found = self._opened.session.run(list(OUTPUTS), feed)
-            for target, part in zip(answer, found, strict=True):
-                target[rows] = np.asarray(part)
+            for target, part in zip(answer, self._opened.run(list(OUTPUTS), feed), strict=True):
+                target[rows] = part
         return answer._replace(points=answer.points + np.asarray(frame.centre))
 
 

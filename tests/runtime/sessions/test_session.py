@@ -269,7 +269,9 @@ def test_a_provider_that_is_not_used_is_an_error(bundle: Path, monkeypatch: pyte
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: listed)
     load = onnxruntime.InferenceSession
     monkeypatch.setattr(
-        onnxruntime, "InferenceSession", lambda path, options, providers: load(path, options, providers=providers[1:])
+        onnxruntime,
+        "InferenceSession",
+        lambda path, options, providers, **more: load(path, options, providers=providers[1:], **more),
     )
     with pytest.raises(MissingDependencyError, match="uses CPUExecutionProvider, expected CUDAExecutionProvider"):
         UnwrapSession(bundle, providers=("CUDAExecutionProvider", "CPUExecutionProvider"))
@@ -285,3 +287,20 @@ def test_providers_are_a_list_of_names(bundle: Path, providers: Any) -> None:
 def test_a_chunk_or_thread_count_below_one_is_refused(bundle: Path, options: dict[str, int]) -> None:
     with pytest.raises(InputError, match="expected at least 1"):
         UnwrapSession(bundle, **options)  # type: ignore[arg-type]
+
+
+def test_answers_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    quarter, broken = (np.float32(value).tobytes() for value in (0.25, np.nan))
+    assert WITH_METADATA.count(quarter) == 1
+    (tmp_path / "a.onnx").write_bytes(WITH_METADATA.replace(quarter, broken))
+    session = UnwrapSession(tmp_path / "a.onnx")
+    with pytest.raises(BundleError, match=r"a\.onnx: the model answers uv = NaN or infinite.*damaged"):
+        session.unwrap(np.asarray([FRAME.centre]))
+
+
+def test_text_that_is_none_inside_a_model_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert WITH_METADATA.count(b"Cast") == 1
+    (tmp_path / "a.onnx").write_bytes(WITH_METADATA.replace(b"Cast", b"C\x8f\xffs"))
+    with pytest.raises(BundleError, match="no usable ONNX model"):
+        UnwrapSession(tmp_path / "a.onnx")
+    assert tuple(capfd.readouterr()) == ("", "")
