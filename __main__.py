@@ -108,6 +108,7 @@ def _perform(run: Run, console: Console) -> int:
 
     chosen_maps(run.outputs)
     source = load_any(run.mesh)
+    console.note_changes(source)
     with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
         if isinstance(source, Asset):
             outputs = run.outputs.for_asset(source)
@@ -143,6 +144,7 @@ def train(
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
+    console.note_changes(asset)
     name, report = f"{asset.stem}.{TRAINED}", f"{asset.stem}.train.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         folder.check([name, folder.report_name])
@@ -185,6 +187,7 @@ def export(
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
+    console.note_changes(asset)
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
         outputs = outputs.for_asset(asset)
         check_outputs(folder, outputs, chosen_maps(outputs))

@@ -89,6 +89,7 @@ def bake(
     from ..runtime.pack.packing import atlas_from_uv
 
     asset = load(mesh)
+    console.note_changes(asset)
     entries = chosen_maps(outputs.for_asset(asset), high=high, fields=options.fields, seed=options.seed)
     atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
     atlas = with_tangents(atlas, entries)

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from .io.points.cloud import PointCloud
+    from .mesh import Asset
+
 SUMMARY = {
     "charts": "{}",
     "symmetric_dirichlet_mean": "{:.4f}",
@@ -42,6 +45,13 @@ class Console:
         """The summary on stdout, one figure a line, then the files; nothing when quiet."""
         if not self.quiet:
             show(numbers, files)
+
+    def note_changes(self, source: Asset | PointCloud) -> None:
+        """A note on what reading and cleaning could not take as it was, where there is something to say."""
+        from .io.changes import told
+
+        if fact := told(source.changes):
+            self.note(f"{source.stem}: {fact}")
 
     def note(self, fact: str) -> None:
         """One line on stderr about something the user should know and need not mend; nothing when quiet."""

@@ -1,0 +1,58 @@
+"""What reading and cleaning could not take as it was, in words: one line for the user.
+
+Counts that tell a reader of the report something, but change nothing that the user would miss, stay unsaid: vertices
+that were welded or that no face uses, and how many parts there are.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+UNSAID = frozenset({"welded_vertices", "unreferenced_vertices", "components"})
+WORDS = {
+    "coincident_faces": "{} lying on another kept, each side with uv of its own|face|faces",
+    "degenerate_faces": "{} without area left out|face|faces",
+    "dropped_face_colors": "colours of {} left out, as the vertices have their own|face|faces",
+    "dropped_normals": "normals of {} left out, as other parts have none|vertex|vertices",
+    "faces_under_three_corners": "{} of under three corners left out|face|faces",
+    "faces_without_colors": "{} without colours made white|face|faces",
+    "faces_without_uv": "{} without uv in a mesh that has them|face|faces",
+    "flipped_faces": "{} turned to agree with the others around|face|faces",
+    "missing_materials": "{} of materials not found beside the mesh|file|files",
+    "missing_textures": "{} not found or in a format that is not read|texture|textures",
+    "missing_uv_or_normals": "{} referring to uv or normals that the file does not hold|corner|corners",
+    "non_manifold_edges": "{} with three faces or more, cut there|edge|edges",
+    "points_without_normal": "{} without a normal in a cloud that has them|point|points",
+    "repaired_normals": "{} of no length or not finite replaced|normal|normals",
+    "skipped_animations": "{} left out|animation|animations",
+    "skipped_cameras": "{} left out|camera|cameras",
+    "skipped_lights": "{} left out|light|lights",
+    "skipped_lines": "{} left out|line element|line elements",
+    "skipped_morph_targets": "{} left out|morph target|morph targets",
+    "skipped_points": "{} left out|point element|point elements",
+    "skipped_primitives": "{} of points or lines left out|primitive|primitives",
+    "skipped_skins": "{} left out: the mesh stands as it was modelled|skin|skins",
+    "textures_of_other_uv": "{} on a second uv set left out|texture|textures",
+    "trailing_bytes": "{} behind the last triangle left out|byte|bytes",
+    "vertices_without_colors": "{} without colours made white|vertex|vertices",
+    "vertices_without_z": "{} of two numbers placed at z = 0|vertex|vertices",
+}
+
+
+def told(changes: Mapping[str, int]) -> str:
+    """One line without a full stop, "" where there is nothing to say.
+
+    >>> told({"degenerate_faces": 1, "flipped_faces": 298, "components": 3})
+    '1 face without area left out; 298 faces turned to agree with the others around'
+    """
+    return "; ".join(_clause(name, count) for name, count in changes.items() if count and name not in UNSAID)
+
+
+def _clause(name: str, count: int) -> str:
+    if name not in WORDS:
+        return f"{name.replace('_', ' ')}: {count}"
+    form, one, many = WORDS[name].split("|")
+    return form.format(f"{count} {one if count == 1 else many}")
