@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 PACKAGE = "flexpara"
-USER_EXTRAS = ("", "train", "bake", "samples")
+USER_EXTRAS = ("", "train", "bake", "samples", "formats")
 INSTRUCTION_SETS = ("avx2", "fma", "avx512f", "avx512_bf16", "amx_bf16", "asimd", "bf16")
 
 

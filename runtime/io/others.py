@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 8 << 30
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
-REMEDY = "pip install 'trimesh[easy]', or convert the file"
+REMEDY = "pip install 'flexpara[formats]', or convert the file"
 MADE_UP_GREY = [102, 102, 102, 255]
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # its log would end on stderr
 ARCHIVES = frozenset({"3mf", "3dxml", "zae"})

@@ -9,7 +9,7 @@ import base64
 import binascii
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
@@ -18,6 +18,7 @@ import numpy as np
 from ...errors import MeshError
 from ..pictures import inside
 from ..rawmesh import MAX_FACES
+from .compression import DRACO, MESHOPT, decode_view, meshopt_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,16 +28,19 @@ if TYPE_CHECKING:
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-UNREADABLE = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+READ_EXTENSIONS = (DRACO, *MESHOPT, "KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_lights_", "EXT_lights_")
+READ_EXTENSIONS += ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_animation_", "KHR_xmp")
+"""Beginnings of extensions that are read, or that say nothing about the shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class GltfFile:
-    """The JSON tree, its buffers' bytes, and the folder its references may reach."""
+    """The JSON tree, its buffers' bytes, the folder its references may reach; bufferViews decoded so far."""
 
     tree: dict[str, Any]
     buffers: list[bytes]
     folder: Path
+    decoded: dict[int, bytes] = field(default_factory=dict)
 
 
 def parse_tree(data: bytes) -> tuple[dict[str, Any], bytes | None]:
@@ -59,10 +63,10 @@ def parse_tree(data: bytes) -> tuple[dict[str, Any], bytes | None]:
     version = str(tree["asset"]["version"])
     if not version.startswith("2."):
         raise MeshError(f"glTF version {version[:20]}, expected 2.x; convert the file")
-    compressed = [name for name in UNREADABLE if name in tree.get("extensionsRequired", [])]
-    if compressed:
+    unknown = [name for name in tree.get("extensionsRequired", []) if not str(name).startswith(READ_EXTENSIONS)]
+    if unknown:
         raise MeshError(
-            f"the glTF file is compressed ({compressed[0]}), which is not read; export it without compression"
+            f"the glTF file requires the extension {str(unknown[0])[:60]!r}, which is not read; export it without"
         )
     return tree, binary
 
@@ -74,7 +78,9 @@ def read_buffers(tree: dict[str, Any], binary: bytes | None, folder: Path) -> li
     """
     result = []
     for buffer in tree.get("buffers", []):
-        if "uri" in buffer:
+        if "uri" not in buffer and (meshopt_of(buffer) or {}).get("fallback"):
+            result.append(b"")  # nothing to fall back on: its views are compressed in another buffer
+        elif "uri" in buffer:
             result.append(read_resource(buffer["uri"], folder))
         elif binary is not None:
             result.append(binary)
@@ -109,6 +115,12 @@ def buffer_view(file: GltfFile, index: int) -> tuple[memoryview, dict[str, Any]]
     Raises: MeshError where it ends behind its buffer.
     """
     view = file.tree["bufferViews"][index]
+    packed = meshopt_of(view)
+    if packed is not None:
+        if index not in file.decoded:
+            start, length = packed.get("byteOffset", 0), packed["byteLength"]
+            file.decoded[index] = decode_view(file.buffers[packed["buffer"]][start : start + length], packed)
+        return memoryview(file.decoded[index]), view
     start = view.get("byteOffset", 0)
     data = memoryview(file.buffers[view["buffer"]])[start : start + view["byteLength"]]
     if start < 0 or len(data) != view["byteLength"]:
@@ -151,6 +163,11 @@ def read_accessor(file: GltfFile, index: int) -> NDArray[Any]:
         entries, _ = buffer_view(file, what["bufferView"])
         place = _table(places, where.get("byteOffset", 0), np.dtype(kind).itemsize, sparse["count"], kind, 1)[:, 0]
         values[place] = _table(entries, what.get("byteOffset", 0), width, sparse["count"], dtype, columns)
-    if accessor.get("normalized") and values.dtype.kind in "iu":
-        return np.maximum(values / np.iinfo(dtype).max, -1.0)
+    return as_stored(file, index, values)
+
+
+def as_stored(file: GltfFile, index: int, values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers of an accessor as it means them: float64 where they are real or normalized, else as they are."""
+    if file.tree["accessors"][index].get("normalized") and values.dtype.kind in "iu":
+        return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
     return values.astype(np.float64) if values.dtype.kind == "f" else values

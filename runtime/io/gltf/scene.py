@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import MeshError
+from ...errors import FlexparaError, MeshError
 from ..colors import linear_to_srgb
 from ..polygons import strip_triangles
 from ..rawmesh import MAX_FACES, RawMesh, merge, transformed
-from .buffers import GltfFile, parse_tree, read_accessor, read_buffers
+from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor, read_buffers
+from .compression import DRACO, decode_draco
 from .materials import read_materials, uv_set
+from .nodes import left_out, placed_meshes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,13 +40,14 @@ def read_gltf(data: bytes, folder: Path) -> RawMesh:
         folder: where it lies; references outside of it, and URLs, are refused.
 
     Raises:
-        MeshError: damaged, compressed in a way that is not read, without triangles, or with such a reference.
+        MeshError: damaged, of an extension that must be known and is not, without triangles, or with such a reference.
+        MissingDependencyError: compressed, and flexpara[formats] is absent.
     """
     try:
         tree, binary = parse_tree(data)
         file = GltfFile(tree, read_buffers(tree, binary, folder), folder)
         return _scene(file)
-    except MeshError:
+    except FlexparaError:
         raise
     except (
         KeyError,
@@ -70,51 +73,10 @@ def _what(error: Exception) -> str:
     return "a value has the wrong type or size"
 
 
-def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """(4, 4) float64, column vectors: T · R · S, or the matrix given (stored by columns)."""
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    x, y, z, w = (float(value) for value in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation * np.asarray(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix
-
-
-def _placed_meshes(tree: dict[str, Any]) -> list[tuple[int, NDArray[np.float64]]]:
-    """(mesh, node → world matrix) of each node that has a mesh, depth first in the order of the scene."""
-    nodes = tree.get("nodes", [])
-    children = {child for node in nodes for child in node.get("children", [])}
-    scenes = tree.get("scenes", [])
-    roots = (
-        scenes[tree.get("scene", 0)].get("nodes", []) if scenes else [i for i in range(len(nodes)) if i not in children]
-    )
-    waiting, seen, placed = [(root, np.eye(4)) for root in reversed(roots)], set(), []
-    while waiting:
-        index, parent = waiting.pop()
-        if index in seen:
-            raise MeshError(
-                f"glTF node {index} has several parents or is its own ancestor, expected a tree; export again"
-            )
-        seen.add(index)
-        world = parent @ _local_matrix(nodes[index])
-        if "mesh" in nodes[index]:
-            placed.append((nodes[index]["mesh"], world))
-        waiting += [(child, world) for child in reversed(nodes[index].get("children", []))]
-    return placed
-
-
 def _scene(file: GltfFile) -> RawMesh:
     materials, changes = read_materials(file)
     parts, skipped, faces = [], 0, 0
-    for mesh, world in _placed_meshes(file.tree):
+    for mesh, world in placed_meshes(file):
         for primitive in file.tree["meshes"][mesh]["primitives"]:
             if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
                 skipped += 1
@@ -127,31 +89,42 @@ def _scene(file: GltfFile) -> RawMesh:
         found = "points or lines only (give points as .ply, .xyz or .npy)" if skipped else "no mesh"
         raise MeshError(f"the glTF scene holds {found}, expected triangles; check the export")
     whole = merge(parts)
-    whole.changes.update(changes, skipped_primitives=skipped)
+    whole.changes.update(changes, skipped_primitives=skipped, **left_out(file.tree))
     return whole
 
 
 def _primitive(file: GltfFile, primitive: dict[str, Any], materials: Sequence[Material]) -> RawMesh:
-    attributes = primitive["attributes"]
-    positions = read_accessor(file, attributes["POSITION"]).astype(np.float64)
-    indices = read_accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(positions))
-    faces = _triangles(indices.astype(np.int64), primitive.get("mode", TRIANGLES))
-    normals = read_accessor(file, attributes["NORMAL"]).astype(np.float64) if "NORMAL" in attributes else None
+    values, faces = _attributes(file, primitive)
+    positions, normals = values["POSITION"].astype(np.float64), values.get("NORMAL")
     index = primitive.get("material")
-    name = f"TEXCOORD_{0 if index is None else uv_set(file.tree['materials'][index])}"
-    uv = read_accessor(file, attributes[name]).astype(np.float64) if name in attributes else None
-    colors = _srgb(read_accessor(file, attributes["COLOR_0"])) if "COLOR_0" in attributes else None
-    if any(values is not None and len(values) != len(positions) for values in (normals, uv, colors)):
+    uv = values.get(f"TEXCOORD_{0 if index is None else uv_set(file.tree['materials'][index])}")
+    colors = _srgb(values["COLOR_0"]) if "COLOR_0" in values else None
+    if any(given is not None and len(given) != len(positions) for given in (normals, uv, colors)):
         raise MeshError("a glTF primitive has attributes of different lengths; export the file again")
     return RawMesh(
         positions=positions,
         faces=faces,
-        normals=normals,
+        normals=None if normals is None else normals.astype(np.float64),
         colors=colors,
-        uv=None if uv is None else uv * (1.0, -1.0) + (0.0, 1.0),
+        uv=None if uv is None else uv.astype(np.float64) * (1.0, -1.0) + (0.0, 1.0),
         materials=() if index is None else (materials[index],),
         face_material=None if index is None else np.zeros(len(faces), dtype=np.int64),
     )
+
+
+def _attributes(file: GltfFile, primitive: dict[str, Any]) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """The attributes that are read, by name, and the triangles (f, 3) int64."""
+    accessors = primitive["attributes"]
+    wanted = [name for name in accessors if name in ("POSITION", "NORMAL", "COLOR_0") or name.startswith("TEXCOORD_")]
+    packed = primitive.get("extensions", {}).get(DRACO)
+    if packed is not None:
+        names = {name: place for name, place in packed["attributes"].items() if name in wanted}
+        decoded, faces = decode_draco(bytes(buffer_view(file, packed["bufferView"])[0]), names)
+        return {name: as_stored(file, accessors[name], found) for name, found in decoded.items()}, faces
+    values = {name: read_accessor(file, accessors[name]) for name in wanted}
+    count = len(values["POSITION"])
+    indices = read_accessor(file, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
+    return values, _triangles(indices.astype(np.int64), primitive.get("mode", TRIANGLES))
 
 
 def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:

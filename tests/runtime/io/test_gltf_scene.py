@@ -247,8 +247,8 @@ def broken(change: str) -> bytes:
             tree["bufferViews"][0]["byteStride"] = 1
         case "own parent":
             tree["nodes"][0]["children"] = [0]
-        case "draco":
-            tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+        case "extension":
+            tree["extensionsRequired"] = ["KHR_texture_transform", "ACME_folded_space"]
         case "version":
             tree["asset"]["version"] = "1.0"
         case "text":
@@ -278,7 +278,7 @@ def broken(change: str) -> bytes:
         ("view too long", "ends behind"),
         ("no stride", "damaged"),
         ("own parent", "several parents"),
-        ("draco", "without compression"),
+        ("extension", "requires the extension .ACME_folded_space"),
         ("version", "1.0, expected 2"),
         ("text", "damaged"),
         ("list", "damaged"),

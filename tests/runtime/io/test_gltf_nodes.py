@@ -1,0 +1,71 @@
+"""glTF nodes: instances, and what a still mesh can't say."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.gltf.scene import read_gltf
+
+
+class Maker:
+    """A file of one triangle, with room for more accessors of floats."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.tree: dict[str, Any] = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": []}
+        self.tree["meshes"] = [{"primitives": [{"attributes": {"POSITION": self.add(np.eye(3, k=-1))}}]}]
+        self.tree["nodes"] = [{"mesh": 0}]
+
+    def add(self, rows: np.ndarray) -> int:
+        data = rows.astype(np.float32).tobytes()
+        self.tree["bufferViews"].append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
+        view = len(self.tree["bufferViews"]) - 1
+        kind = {"componentType": 5126, "count": len(rows), "type": f"VEC{rows.shape[1]}"}
+        self.tree["accessors"].append({"bufferView": view, **kind})
+        self.data += data
+        return view
+
+    def gltf(self) -> bytes:
+        uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+        return json.dumps({**self.tree, "buffers": [{"byteLength": len(self.data), "uri": uri}]}).encode()
+
+
+def test_what_a_still_mesh_cannot_say_is_counted(tmp_path: Path) -> None:
+    maker = Maker()
+    maker.tree |= {"animations": [{}], "skins": [{}, {}], "cameras": [{}]}
+    maker.tree["meshes"][0]["primitives"][0]["targets"] = [{}, {}, {}]
+    maker.tree["extensions"] = {"KHR_lights_punctual": {"lights": [{}]}}
+    counts = {name: count for name, count in read_gltf(maker.gltf(), tmp_path).changes.items() if count}
+    assert counts == {
+        "skipped_animations": 1,
+        "skipped_skins": 2,
+        "skipped_morph_targets": 3,
+        "skipped_cameras": 1,
+        "skipped_lights": 1,
+    }
+
+
+def test_instances_stand_where_they_are_put(tmp_path: Path) -> None:
+    maker = Maker()
+    half = np.sqrt(0.5)
+    names = {
+        "TRANSLATION": maker.add(np.array([[5, 0, 0], [0, 0, 7]])),
+        "ROTATION": maker.add(np.array([[0, 0, 0, 1], [0, 0, half, half]])),
+        "SCALE": maker.add(np.array([[2, 2, 2], [1, 1, 1]])),
+    }
+    node = maker.tree["nodes"][0]
+    node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": names}}
+    node["translation"] = [0, 0, 1]
+    raw = read_gltf(maker.gltf(), tmp_path)
+    expected = [[[5, 0, 1], [7, 0, 1], [5, 2, 1]], [[0, 0, 8], [0, 1, 8], [-1, 0, 8]]]
+    np.testing.assert_allclose(raw.positions[raw.faces], expected, atol=1e-6)
+    maker.tree["accessors"][names["SCALE"]]["count"] = 1
+    with pytest.raises(MeshError, match="instance attributes of different lengths"):
+        read_gltf(maker.gltf(), tmp_path)
