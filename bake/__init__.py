@@ -1,4 +1,10 @@
-"""Maps on an atlas: OpenGL, or numpy where there is none; rays through Embree; image files through OpenImageIO."""
+"""Baking: maps of an atlas by OpenGL, or numpy where there is none, rays through Embree; the files that hold them.
+
+Public face: `bake` (baker.py) makes textures in memory, `output.write_outputs` writes all that a run leaves.
+raster/ finds the surface under each texel, maps/ make values of it, highpoly/ take them from another mesh, files/ write
+them, pictures/ draw the preview.  Imports run in this order: color, heat, texture, bakemap → raster → maps → highpoly,
+files, seams → pictures, windows → baker → udim, checks, output → commands.
+"""
 
 from typing import TYPE_CHECKING
 

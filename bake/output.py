@@ -148,7 +148,7 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
     """What the report says of the textures: their files, and how far the two sides of seams differ in each."""
     if not baked.textures:
         return {}
-    from .seamcheck import seam_report
+    from .seams import seam_report
 
     return {"files": baked.files, "seam_error": seam_report(atlas, baked.textures)}
 
@@ -156,19 +156,17 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
 def bleeding(atlas: Atlas, size: int, padding: int) -> int:
     """The highest mip level of such textures at which no chart takes in another's texels."""
     from .baker import chart_labels
-    from .seamcheck import clean_mip
+    from .seams import clean_mip
 
     return clean_mip(chart_labels(atlas, size, padding), atlas)
 
 
 def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
     """The preview; without OpenGL a warning in its place."""
-    from ..runtime.geometry.metrics import face_distortion
     from .pictures.preview import render_preview
     from .raster.plan import SoftwareWarning
 
-    stretch = face_distortion(asset.surface, atlas.corner_uv)
     try:
-        output.write(f"{output.stem}.preview.png", lambda path: render_preview(atlas, stretch, path))
+        output.write(f"{output.stem}.preview.png", lambda path: render_preview(atlas, asset, path))
     except MissingDependencyError as error:
         warnings.warn(f"no preview is drawn, since {error}", SoftwareWarning, stacklevel=2)

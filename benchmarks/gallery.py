@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexpara.bake.pictures.gallery import render_sheet
 from flexpara.runtime.files import write_whole
 from flexpara.runtime.geometry.metrics import measure, uv_charts
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.pack.seams import atlas_normals, split_vertices
 
+from .contact_sheet import render_sheet
 from .paper import outcomes_of, with_common_options, with_meshes, words
 from .systems import MODES, MULTI_CHART, NAMES
 
@@ -75,20 +75,21 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
 
 def main(argv: list[str] | None = None) -> int:
     """Unwrap and draw; 1 when there is a mesh of which there is nothing to draw."""
-    arguments, ours, missing = parse(argv), list[tuple[str, Atlas]](), 0
+    arguments, ours, missing = parse(argv), list[tuple[str, Asset, Atlas]](), 0
     arguments.output.mkdir(parents=True, exist_ok=True)
     for path in arguments.files:
-        entries = entries_of(load_asset(path), arguments)
+        asset = load_asset(path)
+        entries = entries_of(asset, arguments)
         missing += not entries
         if entries:
-            draw_sheet([(title, atlas) for _, title, atlas in entries], arguments.output / f"{path.stem}.png")
-        ours += [(title, atlas) for system, title, atlas in entries if system == "flexpara"]
+            draw_sheet([(title, asset, atlas) for _, title, atlas in entries], arguments.output / f"{path.stem}.png")
+        ours += [(title, asset, atlas) for system, title, atlas in entries if system == "flexpara"]
         if len(arguments.files) > 1 and ours:
             draw_sheet(ours, arguments.output / "gallery.png")
     return 1 if missing else 0
 
 
-def draw_sheet(entries: list[tuple[str, Atlas]], path: Path) -> None:
+def draw_sheet(entries: list[tuple[str, Asset, Atlas]], path: Path) -> None:
     """One contact sheet, written whole; its path goes to stdout."""
     write_whole(path, lambda place: render_sheet(entries, place), force=True)
     print(path)

@@ -1,1 +1,5 @@
-"""Image files, and mesh files with their textures, named and packed as an engine wants them."""
+"""Files: PNG and EXR images, engine targets, glTF and USD with their textures.
+
+Public face: `images.write_texture`, `textures.write_textures`, `targets.write_target`, `exr.write_layers`,
+`gltf.write_glb`, `usd.write_usda`.
+"""

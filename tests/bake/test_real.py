@@ -13,7 +13,6 @@ from flexpara.bake.baker import bake
 from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.pictures.preview import preview_pixels
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.runtime.geometry.metrics import face_distortion
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Atlas
@@ -84,6 +83,6 @@ def test_a_glb_read_back_gives_the_same_bake(spot: Pair, tmp_path: Path) -> None
 
 def test_the_preview_of_a_real_mesh_is_no_empty_page(spot: Pair) -> None:
     atlas, asset = spot
-    picture = preview_pixels(atlas, face_distortion(asset.surface, atlas.corner_uv))
+    picture = preview_pixels(atlas, asset)
     assert np.isfinite(picture).all()
     assert picture.std() > 0.1

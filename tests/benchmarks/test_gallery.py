@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 pytest.importorskip("moderngl")
 
 from benchmarks import gallery, paper
+from benchmarks.contact_sheet import BAND, COLUMNS, PANEL
 from benchmarks.systems import Answer, Job, Outcome
 from flexpara.bake.files.images import read_image
-from flexpara.bake.pictures.gallery import BAND, COLUMNS, PANEL
-from flexpara.bake.pictures.preview import seam_segments
+from flexpara.bake.seams import chart_outlines, seam_edges
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Surface
 
@@ -53,17 +53,18 @@ def test_an_atlas_of_any_uv_fills_the_square_without_stretching_it() -> None:
 
 def test_only_the_systems_cuts_are_drawn_as_seams() -> None:
     asset = sheet()
-    for cut, charts, borders in ((False, 1, 6), (True, 2, 8)):
+    for cut, charts, seams, outlines in ((False, 1, 0, 6), (True, 2, 1, 8)):
         atlas = gallery.atlas_of(asset, flat(asset, cut=cut))
         assert atlas.face_chart.max() + 1 == charts
-        assert len(seam_segments(atlas, atlas.positions)) == borders
+        assert len(seam_edges(atlas)) == seams
+        assert len(chart_outlines(atlas)) == outlines
 
 
 def test_corners_that_agree_but_for_rounding_are_one_vertex() -> None:
     asset = sheet()
     uv = flat(asset, cut=False)
     uv += np.random.default_rng(0).uniform(-1e-7, 1e-7, uv.shape)
-    assert len(seam_segments(gallery.atlas_of(asset, uv), CORNERS)) == 6
+    assert len(chart_outlines(gallery.atlas_of(asset, uv))) == 6
 
 
 def test_the_title_has_the_figures_of_the_layout() -> None:

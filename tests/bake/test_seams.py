@@ -11,12 +11,14 @@ import pytest
 
 from flexpara.bake.baker import bake, chart_labels
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.bake.seamcheck import (
+from flexpara.bake.seams import (
     agrees_across_seams,
+    chart_outlines,
     clean_mip,
     find_seams,
     footprint,
     sample_seams,
+    seam_edges,
     seam_error,
     seam_report,
 )
@@ -124,3 +126,32 @@ def test_a_real_mesh_agrees_across_its_seams(models: Path) -> None:
     assert len(find_seams(atlas)) > 100
     assert report["position"]["max"] <= 1.0 / 255.0
     assert report["normal-object"]["p99"] <= 1.0 / 255.0
+
+
+def test_seams_of_a_cut_sphere_are_its_cut(sphere: Pair) -> None:
+    """Rows of 16 faces along the meridian that is cut, columns of 24 around each pole that is left out."""
+    edges = seam_edges(sphere[0])
+    assert edges.shape == (16, 2, 3)
+    np.testing.assert_allclose(edges[..., 0], 0.0, atol=1e-9)
+    assert (edges[..., 2] > 0).all()
+    assert chart_outlines(sphere[0]).shape == (2 * 16 + 2 * 24, 2, 2)
+
+
+def test_an_edge_whose_normals_alone_are_split_is_no_seam(quad: Pair) -> None:
+    """A square folded along its diagonal, shaded flat: two vertices at each end of the diagonal, with one uv."""
+    atlas, _ = quad
+    corner = np.array([0, 1, 2, 0, 2, 3])
+    split = replace(
+        atlas,
+        positions=atlas.positions[corner],
+        uv=atlas.uv[corner],
+        normals=atlas.normals[corner],
+        source_vertex=corner,
+        faces=np.arange(6).reshape(2, 3),
+    )
+    assert len(seam_edges(split)) == 0
+    assert len(chart_outlines(split)) == 4
+    moved = split.uv.copy()
+    moved[3:] *= 0.5
+    assert len(seam_edges(replace(split, uv=moved))) == 1
+    assert len(chart_outlines(replace(split, uv=moved))) == 6

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from ..runtime.geometry.rows import equal_rows, first_of_each
 from .raster.layout import border_edges
 
 if TYPE_CHECKING:
@@ -72,22 +73,65 @@ def agrees_across_seams(name: str, space: str) -> bool:
     return not (name in PER_FACE or space.startswith(("tangent", "uv")))
 
 
+def chart_outlines(atlas: Atlas) -> NDArray[np.float64]:
+    """(b, 2, 2) float64 uv: ends of the edges at which the uv end, those of holes and of the mesh's border included."""
+    return _border_uv(atlas, _uv_borders(atlas)[1])
+
+
+def seam_edges(atlas: Atlas) -> NDArray[np.float64]:
+    """(e, 2, 3) float64: ends of the edges of the surface that lie in uv more than once."""
+    welded, borders = _uv_borders(atlas)
+    order, start, count = _groups_of_edges(welded[borders[:, 0]], borders[:, 1])
+    first = borders[order[start[count > 1]]]
+    return atlas.positions[np.stack([atlas.faces[first[:, 0], (first[:, 1] + i) % 3] for i in (0, 1)], axis=1)]
+
+
 def find_seams(atlas: Atlas) -> NDArray[np.float64]:
     """(e, 2, 2, 2) float64 uv: edge, side, end.  Both sides run the same way along the edge; creases are left out."""
-    face, corner = border_edges(atlas.faces, atlas.uv).T.astype(np.int64)
-    ends = np.stack([atlas.faces[face, corner], atlas.faces[face, (corner + 1) % 3]], axis=1)
-    extent = float(np.ptp(atlas.positions, axis=0).max()) or 1.0
-    _, welded = np.unique(np.round(atlas.positions / (WELD * extent)), axis=0, return_inverse=True)
-    joint = welded.reshape(-1)[ends]
-    turned = joint[:, 0] > joint[:, 1]
-    ends[turned], joint[turned] = ends[turned][:, ::-1], joint[turned][:, ::-1]
-    key = joint[:, 0] * (len(atlas.positions) + 1) + joint[:, 1]
-    order = np.argsort(key, kind="stable")
-    _, start, count = np.unique(key[order], return_index=True, return_counts=True)
-    pair = np.stack([ends[order[start[count == 2]]], ends[order[start[count == 2] + 1]]], axis=1)
-    uv, normal = atlas.uv[pair].astype(np.float64), atlas.normals[pair]
+    welded, borders = _uv_borders(atlas)
+    order, start, count = _groups_of_edges(welded[borders[:, 0]], borders[:, 1])
+    pair = borders[np.stack([order[start[count == 2]], order[start[count == 2] + 1]], axis=1)]
+    ends = np.stack([atlas.faces[pair[..., 0], (pair[..., 1] + i) % 3] for i in (0, 1)], axis=2)
+    joint = np.stack([welded[pair[..., 0], (pair[..., 1] + i) % 3] for i in (0, 1)], axis=2)
+    ends = np.where((joint[..., 0] > joint[..., 1])[..., None], ends[..., ::-1], ends)
+    uv, normal = atlas.uv[ends].astype(np.float64), atlas.normals[ends]
     smooth = np.abs(normal[:, 0] - normal[:, 1]).max(axis=(1, 2), initial=0.0) < SMOOTH
     return uv[smooth & (uv[:, 0] != uv[:, 1]).any(axis=(1, 2))]
+
+
+def _uv_borders(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Faces (f, 3) over vertices welded by position, and borders (b, 2), rows of face and corner.
+
+    Vertices that differ by their normals alone are one for the borders, so those are edges at which the uv end.
+    """
+    extent = float(np.ptp(atlas.positions, axis=0).max()) or 1.0
+    _, place = np.unique(np.round(atlas.positions / (WELD * extent)), axis=0, return_inverse=True)
+    place = place.reshape(-1).astype(np.int64)
+    same = equal_rows(np.column_stack([place.astype(np.float64), atlas.uv.astype(np.float64)]))
+    first = first_of_each(same)
+    return place[atlas.faces], border_edges(same[atlas.faces], atlas.uv[first]).astype(np.int64)
+
+
+def _groups_of_edges(
+    faces: NDArray[np.int64], corner: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Half-edges (b,) sorted by the edge they lie on; where each edge begins in that order, and how many it has.
+
+    faces: (b, 3) of each half-edge.  corner: (b,) at which it starts.
+    """
+    row = np.arange(len(faces))
+    low, high = np.sort(np.stack([faces[row, corner], faces[row, (corner + 1) % 3]]), axis=0)
+    key = low * (int(faces.max(initial=0)) + 1) + high
+    order = np.argsort(key, kind="stable")
+    _, start, count = np.unique(key[order], return_index=True, return_counts=True)
+    return order, start, count
+
+
+def _border_uv(atlas: Atlas, borders: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(b, 2, 2) float64 uv of the ends of borders (b, 2), rows of face and corner."""
+    face, corner = borders.T
+    ends = np.stack([atlas.faces[face, corner], atlas.faces[face, (corner + 1) % 3]], axis=1)
+    return atlas.uv[ends].astype(np.float64)
 
 
 def sample_seams(seams: NDArray[np.float64], size: int) -> SeamSamples:
@@ -166,11 +210,11 @@ def clean_mip(labels: NDArray[np.int32], atlas: Atlas) -> int:
     labels: (size, size) int32, the chart of each texel, gutters included, −1 beyond them.  Levels are halved by boxes,
     as long as the size is even.  −1 where not even the full image is free of bleeding.
     """
-    face, corner = border_edges(atlas.faces, atlas.uv).T.astype(np.int64)
-    ends = atlas.uv[np.stack([atlas.faces[face, corner], atlas.faces[face, (corner + 1) % 3]], axis=1)]
+    borders = _uv_borders(atlas)[1]
+    ends = _border_uv(atlas, borders)
     edge, place = _along(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * labels.shape[0])
-    uv = ends[edge, 0] + place[:, None] * (ends[edge, 1].astype(np.float64) - ends[edge, 0])
-    chart, low, high, level = atlas.face_chart[face[edge]], labels, labels, -1
+    uv = ends[edge, 0] + place[:, None] * (ends[edge, 1] - ends[edge, 0])
+    chart, low, high, level = atlas.face_chart[borders[edge, 0]], labels, labels, -1
     while True:
         texel, weight = footprint(uv, len(low))
         own = (low.reshape(-1)[texel] == chart[:, None]) & (high.reshape(-1)[texel] == chart[:, None])

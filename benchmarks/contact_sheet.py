@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.errors import InputError
-from ..color import chart_colors, linear_from_srgb
-from ..files.images import write_png
-from ..raster.context import open_context
-from ..texture import Texture
-from .canvas import Camera, Lines, draw, three_quarter_axes
-from .glyphs import ADVANCE, ROWS, text_mask
-from .preview import INK, PAPER, checker_cells, layout, seam_segments, solid
+from flexpara.bake.color import chart_colors, linear_from_srgb
+from flexpara.bake.files.images import write_png
+from flexpara.bake.pictures.canvas import Camera, Lines, draw, three_quarter_axes
+from flexpara.bake.pictures.lettering import text_cover, with_text
+from flexpara.bake.pictures.preview import INK, PAPER, checker_cells, layout, shading_normals, solid
+from flexpara.bake.raster.context import open_context
+from flexpara.bake.seams import seam_edges
+from flexpara.bake.texture import Texture
+from flexpara.runtime.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,17 +28,20 @@ if TYPE_CHECKING:
     import moderngl
     from numpy.typing import NDArray
 
-    from ...runtime.mesh import Atlas
+    from flexpara.runtime.mesh import Asset, Atlas
 
-    Entry = tuple[str, Atlas]
+    Entry = tuple[str, Asset, Atlas]
 
-COLUMNS = ("CHECKER", "CHECKER, BACK", "SEAMS", "CHARTS", "UV BY NORMAL", "UV BY CHART")
+COLUMNS = ("Checker", "Checker, back", "Seams", "Charts", "UV by normal", "UV by chart")
 PANEL = 420
 SMALLEST_PANEL = 240
 """Below it the columns' names run into each other."""
 BAND = 44
 """Pixels above each row for its title, and above the sheet for the columns' names."""
 RED = (0.80, 0.008, 0.008)
+GREY = (0.25, 0.25, 0.25)
+COLUMN_HEIGHT, TITLE_HEIGHT, MARGIN = 20.0, 26.0, 24
+"""Heights of the fonts, and the free part left and right of a title, pixels."""
 CLAY = 0.55
 """Linear grey of a shape that shows its seams."""
 
@@ -51,7 +55,7 @@ def sheet_pixels(entries: Sequence[Entry], *, pixels: int = PANEL) -> NDArray[np
     """The contact sheet.
 
     Args:
-        entries: (title, atlas) a row; a title longer than the sheet is wide ends in dots.
+        entries: (title, asset, atlas) a row; a title longer than the sheet is wide ends in dots.
         pixels: side of a panel, 240 or more.
 
     Returns:
@@ -68,24 +72,25 @@ def sheet_pixels(entries: Sequence[Entry], *, pixels: int = PANEL) -> NDArray[np
     width = len(COLUMNS) * pixels
     head = np.full((BAND, width, 3), PAPER, np.float32)
     for number, name in enumerate(COLUMNS):
-        head = written(head, name, number * pixels + (pixels - 2 * ADVANCE * len(name)) // 2, scale=2)
+        head = with_text(head, name, (BAND / 2, (number + 0.5) * pixels), height=COLUMN_HEIGHT, color=GREY)
     rows = [head]
     with open_context() as context:
-        for title, atlas in entries:
+        for title, asset, atlas in entries:
             band = np.full((BAND, width, 3), PAPER, np.float32)
-            rows.append(written(band, shortened(title, width), 24, scale=3))
-            rows.append(np.concatenate(panels(context, atlas, pixels), axis=1))
+            text, place = shortened(title, width), (BAND / 2, float(MARGIN))
+            rows.append(with_text(band, text, place, height=TITLE_HEIGHT, color=GREY, align="left"))
+            rows.append(np.concatenate(panels(context, asset, atlas, pixels), axis=1))
     return np.concatenate(rows, axis=0)
 
 
-def panels(context: moderngl.Context, atlas: Atlas, pixels: int) -> list[NDArray[np.float32]]:
+def panels(context: moderngl.Context, asset: Asset, atlas: Atlas, pixels: int) -> list[NDArray[np.float32]]:
     """A panel (pixels, pixels, 3) float32 linear light for each of `COLUMNS`."""
     front = three_quarter_axes()
     back = front * np.array([-1.0, 1.0, -1.0])
     views = [Camera.fit(atlas.positions[atlas.faces].reshape(-1, 3), axes) for axes in (front, back)]
     colors = chart_colors(int(atlas.face_chart.max()) + 1)
-    seams = seam_segments(atlas, atlas.positions)
-    charts = solid(atlas, colors[atlas.face_chart])
+    seams = seam_edges(atlas)
+    charts = solid(atlas, shading_normals(asset), colors[atlas.face_chart])
     checkered = replace(charts, cells=checker_cells(atlas))
     clay = replace(charts, colors=np.full((len(atlas.faces), 3), CLAY, np.float32))
     by_face = replace(atlas, face_chart=np.arange(len(atlas.faces)))
@@ -108,15 +113,9 @@ def normal_colors(atlas: Atlas) -> NDArray[np.float32]:
 
 
 def shortened(title: str, width: int) -> str:
-    """The title as far as a band of that many pixels holds it at scale 3, a margin left and right."""
-    most = (width - 48) // (3 * ADVANCE)
-    return title if len(title) <= most else f"{title[: most - 3]}..."
-
-
-def written(band: NDArray[np.float32], text: str, left: int, *, scale: int) -> NDArray[np.float32]:
-    """The band with a line of text in mid height from pixel column `left`; letters are 7 · scale pixels high."""
-    mask = text_mask(text, scale=scale)
-    top = (len(band) - ROWS * scale) // 2
-    result = band.copy()
-    result[top : top + mask.shape[0], left : left + mask.shape[1]][mask] = linear_from_srgb(np.full(3, 0.25))
-    return result
+    """The title as far as a band of that many pixels holds it, a margin left and right."""
+    room = width - 2 * MARGIN
+    if text_cover(title, TITLE_HEIGHT).shape[1] <= room:
+        return title
+    fits = [most for most in range(len(title)) if text_cover(f"{title[:most]}...", TITLE_HEIGHT).shape[1] <= room]
+    return f"{title[: max(fits, default=0)]}..."
