@@ -241,7 +241,7 @@ class UnwrapResult:
             output.write(f"{output.stem}.{ending}", lambda path, content=content: path.write_bytes(content))
         if self.cloud is not None:
             self._write_points(output, self.cloud)
-        report["textures"] = write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
+        report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
         output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from ..runtime.extras import requires
 from .checks import exr_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
@@ -42,18 +43,18 @@ class Baked:
 def write_outputs(
     output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
 ) -> dict[str, Any]:
-    """Textures, meshes in each format, preview; what was found about the textures, for the report.
+    """Textures, meshes in each format, preview; for the report what is known of "textures", and "written" of meshes.
 
     outputs: without "auto".  Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
     """
     atlas = with_tangents(atlas, maps)
     baked = bake_textures(output, atlas, asset, outputs, maps, clock)
     with clock.stage("write"):
-        write_meshes(output, atlas, asset, outputs, baked)
+        written = write_meshes(output, atlas, asset, outputs, baked)
     if outputs.preview:
         with clock.stage("preview"):
             _write_preview(output, atlas, asset)
-    return texture_facts(atlas, baked)
+    return {"textures": texture_facts(atlas, baked), "written": written}
 
 
 def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
@@ -114,34 +115,64 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
     return texture_names(textures, stem, file_type=kind)
 
 
-def write_meshes(output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked) -> None:
-    """The mesh in each format asked for."""
+def write_meshes(
+    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked
+) -> dict[str, dict[str, Any]]:
+    """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
+    from .files.written import written_report
+
+    writers: dict[str, Callable[[Path], None]] = {
+        "glb": lambda path: _write_glb(atlas, asset, baked, path),
+        "obj": lambda path: _write_obj(atlas, baked, path),
+        "ply": lambda path: _write_ply(atlas, asset, path),
+        "usda": lambda path: _write_usda(atlas, asset, baked, path),
+    }
+    staged: dict[str, Path] = {}
+
+    def write(kind: str, path: Path) -> None:
+        writers[kind](path)
+        staged[kind] = path
+
+    for kind in (name for name in writers if name in outputs.formats):
+        output.write(f"{output.stem}.{kind}", partial(write, kind))
+    return written_report(staged, atlas.uv[atlas.faces])
+
+
+def _write_glb(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
+    """With its normal map green up, as glTF wants it, whatever the files beside it are."""
+    with requires("bake"):
+        from .files.gltf import write_glb
+        from .files.targets import GLTF, with_green
+    textures = {
+        name: with_green(texture, GLTF.green) if name == "normal" else texture
+        for name, texture in baked.textures.items()
+    }
+    write_glb(atlas, asset, textures, path)
+
+
+def _write_obj(atlas: Atlas, baked: Baked, path: Path) -> None:
+    """With a material that names the base colour, or what stands for it."""
     from ..runtime.io.obj.write import write_obj
+
+    shown = next((baked.files[name] for name in ("base-color", "uv-checker", "chart") if name in baked.files), None)
+    write_obj(atlas, path, texture=shown)
+
+
+def _write_ply(atlas: Atlas, asset: Asset, path: Path) -> None:
+    """With the source's vertex colours."""
     from ..runtime.io.ply.write import write_ply
 
-    stem, files = output.stem, baked.files
-    shown = next((files[name] for name in ("base-color", "uv-checker", "chart") if name in files), None)
-    if "glb" in outputs.formats:
-        with requires("bake"):
-            from .files.gltf import write_glb
-            from .files.targets import GLTF, with_green
-        # glTF's normal maps are +Y whatever the files beside it are
-        textures = {
-            name: with_green(texture, GLTF.green) if name == "normal" else texture
-            for name, texture in baked.textures.items()
-        }
-        output.write(f"{stem}.glb", lambda path: write_glb(atlas, asset, textures, path))
-    if "obj" in outputs.formats:
-        output.write(f"{stem}.obj", lambda path: write_obj(atlas, path, texture=shown))
-    if "ply" in outputs.formats:
-        output.write(f"{stem}.ply", lambda path: write_ply(atlas, path, colors=asset.colors))
-    if "usda" in outputs.formats:
-        with requires("bake"):
-            from .files.usd import write_usda
-        color = baked.textures.get("base-color")
-        alpha = color is not None and color.pixels.shape[2] == 4
-        named = {USD_KEYS.get(name, name): file for name, file in files.items()}
-        output.write(f"{stem}.usda", lambda path: write_usda(atlas, asset, named, path, alpha=alpha))
+    write_ply(atlas, path, colors=asset.colors)
+
+
+def _write_usda(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
+    """With a material that names the texture files beside it."""
+    with requires("bake"):
+        from .files.usd import write_usda
+    color = baked.textures.get("base-color")
+    alpha = color is not None and color.pixels.shape[2] == 4
+    named = {USD_KEYS.get(name, name): file for name, file in baked.files.items()}
+    write_usda(atlas, asset, named, path, alpha=alpha)
 
 
 def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
