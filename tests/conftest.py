@@ -1,13 +1,19 @@
-"""What all tests share: the import rule of this layout, real meshes, and a training that takes no time."""
+"""What all tests share: the import rule of this layout, real meshes or what stands in for them, instant training.
+
+At the end of a run one line says what was skipped and why.  Where pytest-xdist runs tests side by side, each worker
+gets its share of the cores: libraries read their number of threads from the environment, once, when they are imported.
+"""
 
 from __future__ import annotations
 
+import os
+from collections import Counter
 from dataclasses import asdict
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 if TYPE_CHECKING:
@@ -15,6 +21,7 @@ if TYPE_CHECKING:
     from flexpara.runtime.progress import Progress
 
 MODELS = Path(__file__).resolve().parent.parent.parent / "shared" / "models"
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class _RootIsNoTestPackage:
@@ -28,16 +35,53 @@ class _RootIsNoTestPackage:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the import rule."""
+    """Register the import rule; give the workers that are about to start their share of the cores."""
     config.pluginmanager.register(_RootIsNoTestPackage())
+    workers = len(getattr(config.option, "tx", None) or ())
+    if workers > 1:
+        share = max(1, len(os.sched_getaffinity(0)) // workers)
+        os.environ.update({name: os.environ.get(name, str(share)) for name in THREADS})
 
 
-@pytest.fixture
-def models() -> Path:
-    """The folder of real meshes; tests that use it skip where it is absent."""
-    if not MODELS.is_dir():
-        pytest.skip(f"no real meshes at {MODELS}")
-    return MODELS
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """One line for all skipped tests: how many, and for which reasons."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in skipped)
+    if reasons:
+        told = " · ".join(f"{count} × {reason}" for reason, count in reasons.most_common())
+        terminalreporter.write_line(f"{len(skipped)} tests were skipped: {told}")
+
+
+def sibling(name: str) -> Any:
+    """A helper module beside this file; tests are no package."""
+    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of real meshes, or of made ones of the same names and kinds where that is absent."""
+    if MODELS.is_dir():
+        return MODELS
+    folder = tmp_path_factory.mktemp("standins")
+    sibling("standins").write_standins(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def facts(models: Path) -> dict[str, tuple[int, dict[str, int]]]:
+    """Name → faces and what cleaning changes, of the meshes in `models` for which somebody counted."""
+    real = {
+        "bunny": (56172, {}),
+        "spot": (5856, {"welded_vertices": 295}),
+        "fandisk": (12946, {}),
+        "suzanne": (967, {"welded_vertices": 2, "duplicate_faces": 1, "non_manifold_edges": 1, "components": 3}),
+    }
+    return real if models == MODELS else sibling("standins").FACTS
 
 
 @pytest.fixture
@@ -47,6 +91,8 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     Returns the surfaces it was asked to train, for tests of what happens before and after training.
     """
     torch = pytest.importorskip("torch")
+    import numpy as np
+
     from flexpara.runtime.mesh import Charts, Frame
     from flexpara.train import presets
     from flexpara.train.config import NetConfig, TrainConfig
