@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import flexpara.train  # noqa: F401  # before torch, whose threads it tells how to wait
+
 if TYPE_CHECKING:
     from flexpara.runtime.mesh import Surface
     from flexpara.runtime.progress import Progress

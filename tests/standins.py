@@ -1,8 +1,8 @@
 """Made meshes that stand in for the real ones where `../shared/models` is absent: the same names and kinds.
 
 bunny, homer: closed, without uv, with long ears or limbs and hollow folds.  spot: closed, with uv in six charts that
-don't touch.  fandisk: flat faces, creases and a bore.  suzanne: quads in three parts, with a face twice, corners twice
-and three faces along one edge.  Written as OBJ files, one vertex line a position.
+don't touch.  fandisk: flat and round faces that meet in creases.  suzanne: quads in three parts, with a face twice,
+corners twice and three faces along one edge.  Written as OBJ files.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FACTS: dict[str, tuple[int, dict[str, int]]] = {
     "bunny": (20480, {}),
     "spot": (5292, {"welded_vertices": 256}),
-    "fandisk": (24300, {}),
+    "fandisk": (10800, {}),
     "suzanne": (901, {"welded_vertices": 2, "duplicate_faces": 2, "non_manifold_edges": 1, "components": 3}),
 }
 """Name → faces that are kept and what cleaning changes."""
@@ -69,10 +69,7 @@ def eared(*ears: Bump) -> str:
     axes = [(x, y, z) for x, y, z in rng.normal(size=(60, 3)).tolist() if z < 1.0]
     skin = [(axis, 0.15, 250.0) for axis in axes[::2]] + [(axis, -0.35, 40.0) for axis in axes[1::2]]
     x, y, z = bulged(direction, [*ears, *skin]).T
-    above = np.maximum(z - 1.2, 0.0)
-    angle = 1.8 * np.minimum(above, 1.0)
-    height, depth = np.minimum(z, 1.2) + above * np.cos(angle), y - above * np.sin(angle)
-    return obj_text(np.stack([x, depth, height], axis=1), faces)
+    return obj_text(np.stack([x, y - 2.0 * np.maximum(z - 1.2, 0.0), z], axis=1), faces)
 
 
 def patchwork() -> str:
@@ -98,10 +95,11 @@ def patchwork() -> str:
 
 
 def creased() -> str:
-    """A bevelled block: flat faces at several angles, all edges sharp."""
-    vertices, faces = make_sample("cube", resolution=180)
+    """A tapered block with two round faces, all its edges sharp."""
+    vertices, faces = make_sample("cube", resolution=120)
     x, y, z = vertices.T
-    return obj_text(np.stack([x * (1.3 - 0.3 * z), y, z + 0.3 * np.maximum(x, 0.1)], axis=1) * 4.0, faces)
+    bulge = 1.0 + 0.6 * np.cos(np.pi * x)
+    return obj_text(4.0 * np.stack([x * (1.0 - 0.2 * z), y * (1.0 - 0.2 * z), z * bulge], axis=1), faces)
 
 
 def monkey() -> str:
