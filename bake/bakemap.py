@@ -34,7 +34,7 @@ class BakeMap:
     encoding, file_type, bits: how they are stored (see images.py).  compute: the map itself.
     background: values of the first three channels where no surface lies; a fourth, alpha, is 1 there.  dither:
     whether 8-bit files are dithered. everywhere: True when the map covers the whole image, so that it needs neither
-    background nor gutter.
+    background nor gutter.  estimated: True when each texel carries noise of its own, as what rays find.
     """
 
     name: str
@@ -48,3 +48,4 @@ class BakeMap:
     background: tuple[float, ...]
     dither: bool = False
     everywhere: bool = False
+    estimated: bool = False

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..runtime.errors import InputError
+from .closing import ClosingConfig, closed_seams
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
 from .raster.plan import Plan, open_rasterizer
-from .seams import agrees_across_seams, find_seams, sample_seams, seam_changes, seam_error
+from .seams import agrees_across_seams, find_seams, sample_seams, seam_error
 from .texture import Texture
 from .windows import background_of, blank_gbuffer, computed, map_windows, put_together
 
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas
     from .bakemap import BakeMap, NormalFormat
     from .raster.plan import Device
-
-VISIBLE = 0.5 / 255.0
-"""Difference across a seam, as a share of a map's range, up to which gutters stay as they are."""
 
 
 def bake(
@@ -121,20 +119,20 @@ def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int
 def close_seams(
     atlas: Atlas, entries: Sequence[BakeMap], pixels: Mapping[str, NDArray[np.float32]], inside: NDArray[np.bool_]
 ) -> None:
-    """Where the two sides of seams differ visibly, move the texels beside charts, in place, so that they agree."""
+    """Where the two sides of seams differ visibly, move texels at the borders of charts, in place: see closing.py."""
     entries = [entry for entry in entries if agrees_across_seams(entry.name, entry.space)]
     seams = find_seams(atlas) if entries else np.zeros((0, 2, 2, 2))
     if len(seams) == 0:
         return
-    samples = sample_seams(seams, len(inside))
+    samples, config = sample_seams(seams, len(inside)), ClosingConfig()
     for entry in entries:
-        image = pixels[entry.name]
+        image, shown = pixels[entry.name], entry.value_range == "[0, 1]"
         error = seam_error(as_texture(entry, image), samples)
-        if error is not None and error.maximum > VISIBLE:
-            texel, change = seam_changes(image, samples, inside)
-            row, column = np.divmod(texel, len(inside))
+        if error is not None and error.maximum > config.visible:
+            found = closed_seams(image, samples, inside, config, estimated=entry.estimated, measured=not shown)
+            row, column = np.divmod(found[0], len(inside))
             low, high = {"[0, 1]": (0.0, 1.0), "[-1, 1]": (-1.0, 1.0)}.get(entry.value_range, (-np.inf, np.inf))
-            image[row, column] = np.clip(image[row, column] + change, low, high)
+            image[row, column] = np.clip(found[1], low, high)
 
 
 def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:

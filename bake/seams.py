@@ -1,9 +1,7 @@
-"""Seams under bilinear filtering: how far the two sides differ, and gutters that make them agree.
+"""Seams under bilinear filtering: where they are, and how far their two sides differ.
 
-f faces · e seam edges · s samples along them · g texels that may change · c channels.  A seam edge is one edge of the
-surface that lies in uv twice.  Sampled through either chart it should give one value; bilinear filtering mixes texels
-inside the chart, which are right, with texels beside it, which are extrapolated.  Those beside it are free to choose:
-here such that both sides give the same, by least squares, each moved as little as possible.
+f faces · e seam edges · s samples along them · c channels.  A seam edge is one edge of the surface that lies in uv
+twice.  Sampled through either chart it should give one value; closing.py moves texels so that it does.
 
 Creases (the normals of the two sides differ) are left out: what depends on the normal differs there by right.
 """
@@ -14,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from ..runtime.geometry.rows import equal_rows, first_of_each
 from .raster.layout import border_edges
@@ -33,8 +30,6 @@ SMOOTH = 1e-3
 """Normals of the two sides that differ by less are one normal."""
 WELD = 1e-8
 """Share of the mesh's extent by which one point of a seam may differ from side to side."""
-HOLD = 1e-4
-"""Weight of staying where one is, beside a weight of 1 for a sample's two sides to agree."""
 PER_FACE = frozenset({"chart", "face-id", "material-id", "distortion"})
 """Maps that jump from face to face."""
 
@@ -172,23 +167,6 @@ def seam_error(texture: Texture, samples: SeamSamples) -> SeamError | None:
     return SeamError(float(error.max()), float(np.quantile(error, 0.99)), len(error))
 
 
-def seam_changes(
-    pixels: NDArray[np.float32], samples: SeamSamples, fixed: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """What to add so that the sides of seams agree: flat texels (g,) of an image (h, w, c), and changes (g, c).
-
-    fixed: (h, w) bool, the texels whose centres lie in a chart; they stay.
-    Minimises Σ (difference of the sides)² + `HOLD` Σ (change)² over the free texels of the samples' footprints.
-    """
-    free = np.unique(samples.texel[~fixed.reshape(-1)[samples.texel]])
-    if len(free) == 0:
-        return free, np.zeros((0, pixels.shape[2]), np.float32)
-    matrix = _free_part(samples, free, fixed)
-    system = (matrix.T @ matrix + HOLD * sparse.identity(len(free))).tocsr()
-    right = -(matrix.T @ samples.differences(pixels))
-    return free, _conjugate_gradients(system, right).astype(np.float32)
-
-
 def seam_report(atlas: Atlas, textures: Mapping[str, Texture]) -> dict[str, dict[str, float]]:
     """Map → "max" and "p99" of `seam_error`, for the maps that are one function on both sides of a seam.
 
@@ -232,33 +210,3 @@ def _along(length: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.
     count = np.maximum(np.ceil(PER_TEXEL * length), 2).astype(np.int64)
     edge = np.repeat(np.arange(len(length)), count)
     return edge, (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
-
-
-def _free_part(samples: SeamSamples, free: NDArray[np.int64], fixed: NDArray[np.bool_]) -> sparse.csr_matrix:
-    """(s, g) matrix: the differences' dependence on the free texels."""
-    loose = ~fixed.reshape(-1)[samples.texel]
-    row = np.repeat(np.arange(len(loose)), 8).reshape(loose.shape)[loose]
-    column = np.searchsorted(free, samples.texel[loose])
-    return sparse.csr_matrix((samples.weight[loose], (row, column)), shape=(len(loose), len(free)))
-
-
-def _conjugate_gradients(
-    system: sparse.csr_matrix, right: NDArray[np.float64], *, steps: int = 200, accuracy: float = 1e-5
-) -> NDArray[np.float64]:
-    """Solve system · x = right for all columns of right (g, c) at once, each to a relative accuracy."""
-    scale = np.reciprocal(np.asarray(system.diagonal(), np.float64))[:, None]
-    change, residual = np.zeros_like(right), right.copy()
-    ahead = direction = scale * residual
-    product = (residual * ahead).sum(axis=0)
-    enough = accuracy**2 * np.maximum(product, np.finfo(np.float64).tiny)
-    for _ in range(steps):
-        if (product <= enough).all():
-            break
-        image = system @ direction
-        step = product / np.maximum((direction * image).sum(axis=0), np.finfo(np.float64).tiny)
-        change += step * direction
-        residual -= step * image
-        ahead = scale * residual
-        previous, product = product, (residual * ahead).sum(axis=0)
-        direction = ahead + product / np.maximum(previous, np.finfo(np.float64).tiny) * direction
-    return change

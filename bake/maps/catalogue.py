@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ...runtime.errors import InputError
 from ..bakemap import NORMAL_FORMATS, BakeMap, NormalFormat
 from .checker import uv_checker_map
@@ -33,6 +35,7 @@ def all_maps(normal_format: NormalFormat = "opengl", rays: RaySettings | None = 
     color, part, unit = "linear light", "share", "unit vector"
     rays = rays or RaySettings()
     bent, bent_object = bent_normal_map(rays, normal_format), bent_normal_object_map(rays)
+    noisy: dict[str, Any] = {"estimated": True}
     maps = (
         BakeMap("normal", up, "unit vector", RANGE_11, "signed", "png", 8, tangent, FLAT, dither=True),
         BakeMap("normal-object", "object", "unit vector", RANGE_11, "signed", "exr", 16, object_normal_map(), BLACK),
@@ -47,10 +50,24 @@ def all_maps(normal_format: NormalFormat = "opengl", rays: RaySettings | None = 
         BakeMap("emissive", "none", color, RANGE_01, "srgb", "png", 8, emissive_map(), BLACK),
         BakeMap("face-id", "none", "face number", "whole", "linear", "exr", 32, face_id_map, (-1, -1, -1)),
         BakeMap("material-id", "none", color, RANGE_01, "srgb", "png", 8, material_id_map, BLACK),
-        BakeMap("ao", "none", part, RANGE_01, "unit", "png", 8, ao_map(rays), WHITE, dither=True),
-        BakeMap("bent-normal", up, unit, RANGE_11, "signed", "png", 8, bent, FLAT, dither=True),
-        BakeMap("bent-normal-object", "object", unit, RANGE_11, "signed", "exr", 16, bent_object, BLACK),
-        BakeMap("thickness", "none", "radii", RANGE_01, "unit", "png", 8, thickness_map(rays), BLACK, dither=True),
+        BakeMap("ao", "none", part, RANGE_01, "unit", "png", 8, ao_map(rays), WHITE, dither=True, **noisy),
+        BakeMap("bent-normal", up, unit, RANGE_11, "signed", "png", 8, bent, FLAT, dither=True, **noisy),
+        BakeMap(
+            "bent-normal-object", "object", unit, RANGE_11, "signed", "exr", 16, bent_object, BLACK, estimated=True
+        ),
+        BakeMap(
+            "thickness",
+            "none",
+            "radii",
+            RANGE_01,
+            "unit",
+            "png",
+            8,
+            thickness_map(rays),
+            BLACK,
+            dither=True,
+            estimated=True,
+        ),
         BakeMap("curvature", "none", "shaped", RANGE_01, "unit", "png", 8, curvature_map(), GREY, dither=True),
         BakeMap("distortion", "none", color, RANGE_01, "srgb", "png", 8, distortion_map(), BLACK),
     )
