@@ -16,6 +16,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...runtime.errors import InputError
+from .background import NearestCells
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 FAR = 127
 BAND = 1 << 20
 """Texels whose gutters are searched together."""
+LEAST_NEAR = 16
+"""Texels around charts that are exact where the whole image is filled."""
 MOST_NEAR = 96
 """Texels: up to this radius the search near charts is cheaper than a distance transform of the whole image."""
 
@@ -83,35 +86,41 @@ class GutterPart:
 def fill_gutters(
     images: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]], covered: NDArray[np.bool_], radius: int | None
 ) -> None:
-    """Fill images (h, w, c), each with its background (c,), in place; covered: (h, w) bool; radius as `find_gutter`.
+    """Fill images (h, w, c), each with its background (c,), in place.
 
+    covered: (h, w) bool.  radius: texels; None fills the whole image from the nearest chart, see background.py.
     Band by band on all cores, each with a halo of the radius: the same as all at once, with less memory.
     """
     height, width = covered.shape
-    band = height if radius is None else max(BAND // width, radius, 1)
+    cells = NearestCells.of(covered) if radius is None and covered.any() else None
+    near = (0 if cells is None else max(LEAST_NEAR, 2 * cells.cell)) if radius is None else radius
+    band = max(BAND // width, near, 1)
 
     def fill(top: int) -> None:
-        halo, bottom = radius or 0, min(top + band, height)
-        first, last = max(top - halo, 0), min(bottom + halo, height)
-        part = find_gutter(covered[first:last], radius).part(slice(top - first, bottom - first), slice(width))
+        bottom = min(top + band, height)
+        first, last = max(top - near, 0), min(bottom + near, height)
+        part = find_gutter(covered[first:last], near).part(slice(top - first, bottom - first), slice(width))
+        row, column = np.nonzero(part.beyond) if cells is not None else (np.zeros(0, np.int64),) * 2
+        source = cells.sources(row + top, column) if cells is not None else row
         for image, background in images:
             part.fill(image[first:last], background)
+            image[row + top, column] = image[np.divmod(source, width)]
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(fill, range(0, height, band)))  # list: waits, and raises what was raised
 
 
-def find_gutter(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
+def find_gutter(covered: NDArray[np.bool_], radius: int) -> Gutter:
     """Nearest covered texel of each free texel within radius.
 
-    covered: (h, w) bool.  radius: texels; None fills the whole image.  Nothing covered: nothing to fill.
+    covered: (h, w) bool.  radius: texels.  Nothing covered: nothing to fill.
     Raises: InputError for a negative radius.
     """
     check_padding(radius)
     none = np.zeros(0, np.int64)
     if radius == 0 or not covered.any():
         return Gutter(target=none, source=none, beyond=~covered)
-    if radius is None or radius > MOST_NEAR:
+    if radius > MOST_NEAR:
         return _by_transform(covered, radius)
     down = _down_to_nearest(covered, radius)
     target, source = _nearest_within(covered, down, radius)
@@ -126,14 +135,14 @@ def check_padding(radius: int | None) -> None:
         raise InputError(f"padding {radius}: expected 0 texels or more, or None for the whole image")
 
 
-def _by_transform(covered: NDArray[np.bool_], radius: int | None) -> Gutter:
+def _by_transform(covered: NDArray[np.bool_], radius: int) -> Gutter:
     """By the distance transform of the whole image, whose time does not grow with the radius."""
     width = covered.shape[1]
     free = np.flatnonzero(~covered)
     indices = ndimage.distance_transform_edt(~covered, return_distances=False, return_indices=True)
     row, column = np.asarray(indices, np.int32).reshape(2, -1)[:, free].astype(np.int64)
     down, across = row - free // width, column - free % width
-    near = np.ones(len(free), np.bool_) if radius is None else down * down + across * across <= radius * radius
+    near = down * down + across * across <= radius * radius
     beyond = ~covered
     beyond.reshape(-1)[free[near]] = False
     return Gutter(target=free[near], source=(row * width + column)[near], beyond=beyond)

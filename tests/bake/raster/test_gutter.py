@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from flexpara.bake.raster.gutter import fill_gutters, find_gutter
 from flexpara.runtime.errors import InputError
@@ -20,8 +21,8 @@ def test_one_covered_texel_fills_a_disk() -> None:
     np.testing.assert_array_equal(filled == 9.0, row**2 + column**2 > 4)
 
 
-@pytest.mark.parametrize("radius", [1, 3, 6, None])
-def test_the_source_is_a_nearest_covered_texel(radius: int | None) -> None:
+@pytest.mark.parametrize("radius", [1, 3, 6, 100])
+def test_the_source_is_a_nearest_covered_texel(radius: int) -> None:
     rng = np.random.default_rng(1)
     covered = rng.random((30, 21)) < 0.02
     gutter = find_gutter(covered, radius)
@@ -35,14 +36,14 @@ def test_the_source_is_a_nearest_covered_texel(radius: int | None) -> None:
         reached[target] = True
     for place in np.flatnonzero(~covered.reshape(-1)):
         nearest = np.sqrt(((places - np.array(divmod(int(place), 21))) ** 2).sum(axis=1)).min()
-        assert reached[place] == (radius is None or nearest <= radius)
+        assert reached[place] == (nearest <= radius)
     assert not gutter.beyond.reshape(-1)[gutter.target].any()
     assert not (gutter.beyond & covered).any()
     assert len(gutter.target) + gutter.beyond.sum() == (~covered).sum()
 
 
-@pytest.mark.parametrize("radius", [0, 1, 4, 11, None])
-def test_bands_fill_what_the_whole_image_fills(radius: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("radius", [0, 1, 4, 11, 97])
+def test_bands_fill_what_the_whole_image_fills(radius: int, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
     covered = rng.random((60, 50)) < 0.02
     pixels = rng.random((60, 50, 2), np.float32)
@@ -66,11 +67,30 @@ def test_a_window_with_a_halo_finds_what_the_whole_image_finds() -> None:
 
 
 def test_two_charts_meet_half_way() -> None:
-    covered = np.zeros((1, 10), np.bool_)
-    covered[0, [0, 9]] = True
-    pixels = np.arange(10, dtype=np.float32).reshape(1, 10, 1)
-    filled = find_gutter(covered, None).fill(pixels, BACKGROUND)[0, :, 0]
-    np.testing.assert_array_equal(filled, [0, 0, 0, 0, 0, 9, 9, 9, 9, 9])
+    covered = np.zeros((1, 50), np.bool_)
+    covered[0, [0, 49]] = True
+    pixels = np.arange(50, dtype=np.float32).reshape(1, 50, 1)
+    fill_gutters([(pixels, BACKGROUND)], covered, None)
+    np.testing.assert_array_equal(pixels[0, :, 0], np.repeat([0, 49], 25))
+
+
+@pytest.mark.parametrize("cells", [1024, 40, 10])
+def test_the_whole_image_is_filled_from_near_by(cells: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exactly near charts, and to three diagonals of a cell elsewhere; bands change nothing."""
+    monkeypatch.setattr("flexpara.bake.raster.background.MOST_CELLS", cells)
+    monkeypatch.setattr("flexpara.bake.raster.gutter.BAND", 1200)
+    covered = np.random.default_rng(2).random((80, 77)) < 0.0015
+    number = np.where(covered, np.arange(covered.size).reshape(covered.shape), -1)[..., None].astype(np.float32)
+    fill_gutters([(number, BACKGROUND)], covered, None)
+    source = number[..., 0].astype(np.int64)
+    assert covered.reshape(-1)[source].all()
+    row, column = np.mgrid[:80, :77]
+    distance = np.hypot(source // 77 - row, source % 77 - column)
+    nearest = np.asarray(ndimage.distance_transform_edt(~covered))
+    cell = -(-80 // cells)
+    assert (distance <= nearest + 3.0 * np.sqrt(2.0) * (cell - (cell == 1)) + 1e-9).all()
+    near = nearest <= max(16, 2 * cell)
+    np.testing.assert_allclose(distance[near], nearest[near])
 
 
 def test_covered_texels_keep_their_values_and_the_argument_is_not_changed() -> None:
@@ -84,9 +104,15 @@ def test_covered_texels_keep_their_values_and_the_argument_is_not_changed() -> N
 
 def test_no_radius_and_no_surface_leave_the_background() -> None:
     covered = np.zeros((4, 4), np.bool_)
-    for mask, radius in ((covered, None), (covered, 3), (np.eye(4, dtype=np.bool_), 0)):
+    for mask, radius in ((covered, 3), (np.eye(4, dtype=np.bool_), 0)):
         filled = find_gutter(mask, radius).fill(np.ones((4, 4, 1), np.float32), BACKGROUND)
         np.testing.assert_array_equal(filled[~mask], np.full(((~mask).sum(), 1), 9.0))
+
+
+def test_an_image_without_a_surface_is_background() -> None:
+    pixels = np.ones((4, 4, 1), np.float32)
+    fill_gutters([(pixels, BACKGROUND)], np.zeros((4, 4), np.bool_), None)
+    np.testing.assert_array_equal(pixels, 9.0)
 
 
 def test_a_negative_padding_is_refused() -> None:
