@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..color import linear_from_oklab
-from ..pictures.glyphs import COLUMNS, ROWS, text_mask
+from .glyphs import COLUMNS, ROWS, text_mask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexpara.bake.maps.checker import CELLS, uv_card
-from flexpara.bake.pictures.glyphs import FONT, glyph, text_mask
+from flexpara.bake.maps.glyphs import FONT, glyph, text_mask
 
 
 def test_no_flip_or_turn_maps_the_card_onto_itself() -> None:
