@@ -6,7 +6,7 @@ uv are v up in [0, 1]² of the atlas; positions are in the units of the source f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -231,7 +231,7 @@ class UnwrapResult:
         outputs = outputs if self.cloud is None else outputs.for_points()
         maps = chosen_maps(outputs, seed=self.report["settings"]["seed"])
         check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
-        clock, report = Clock(progress), dict(self.report)
+        clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
         networks = {"onnx": self.onnx}
         if self.found.paper is not None:
             networks["paper.onnx"] = self.found.paper

@@ -24,7 +24,7 @@ from .runtime.console import Console, Manners, complain
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.options import AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
-from .runtime.progress import Clock, progress_bars
+from .runtime.progress import Clock
 from .runtime.runfile import Run
 
 if TYPE_CHECKING:
@@ -107,19 +107,22 @@ def _perform(run: Run, console: Console) -> int:
     from .runtime.mesh import Asset
 
     chosen_maps(run.outputs)
-    source = load_any(run.mesh)
-    console.note_changes(source)
-    with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
-        if isinstance(source, Asset):
-            outputs = run.outputs.for_asset(source)
-            check_outputs(folder, outputs, chosen_maps(outputs))
-        run.save()
-        with progress_bars(quiet=console.quiet) as progress:
+    with console.progress() as progress:
+        source = load_any(run.mesh)
+        if isinstance(source, Asset):  # of points more is known when triangles lie over them
+            console.note_changes(source)
+        with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
+            if isinstance(source, Asset):
+                outputs = run.outputs.for_asset(source)
+                check_outputs(folder, outputs, chosen_maps(outputs))
+            run.save()
             if isinstance(source, Asset):
                 result = unwrap_asset(source, run.options, progress, run.keep)
             else:
                 result = unwrap_cloud(source, run.options, progress, run.keep)
             written = result.write(folder, run.outputs, progress)
+    if result.cloud is not None:
+        console.note_changes(result.asset)
     run.forget()
     console.show({**result.report["metrics"], **result.report["network"]}, written)
     return 0
@@ -151,7 +154,7 @@ def train(
         with requires("train"):
             from .train.presets import train_asset
             from .train.saved import to_bytes
-        with progress_bars(quiet=console.quiet) as progress:
+        with console.progress() as progress:
             trained = train_asset(asset, options, Clock(progress))
         folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
         source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
@@ -194,7 +197,7 @@ def export(
         with requires("train"):
             from .export.assemble import assemble
             from .train.saved import read_trained
-        with progress_bars(quiet=console.quiet) as progress:
+        with console.progress() as progress:
             found = assemble(asset, read_trained(trained, asset), Clock(progress), size=options.size, padding=margin)
             written = UnwrapResult(asset, found).write(folder, outputs, progress)
     console.show({**found.report["metrics"], **found.report["network"]}, written)

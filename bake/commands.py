@@ -13,7 +13,7 @@ from ..runtime.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
 from ..runtime.options import AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
-from ..runtime.progress import Clock, progress_bars
+from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
 from .output import bake_textures, bleeding, texture_facts, with_tangents
 
@@ -98,7 +98,7 @@ def bake(
     report = f"{asset.stem}.bake.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         check_outputs(folder, outputs, entries, meshes=False)
-        with progress_bars(quiet=console.quiet) as progress:
+        with console.progress() as progress:
             if options.udim:
                 from .udim import bake_udim, write_udim
 

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from .extras import PACKAGE
 from .options import Flag
+from .progress import progress_bars
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from .io.points.cloud import PointCloud
     from .mesh import Asset
+    from .progress import Progress
 
 SUMMARY = {
     "charts": "{}",
@@ -57,6 +62,23 @@ class Console:
         """One line on stderr about something the user should know and need not mend; nothing when quiet."""
         if not self.quiet:
             sys.stderr.write(f"flexpara: note: {' '.join(fact.split())}\n")
+
+    @contextmanager
+    def progress(self) -> Iterator[Progress | None]:
+        """Around work: its progress bars, and warnings of ours as notes; when quiet no bars and no warnings at all."""
+        with progress_bars(quiet=self.quiet) as progress, warnings.catch_warnings():
+            if self.quiet:
+                warnings.simplefilter("ignore")
+            shown = warnings.showwarning
+
+            def show_warning(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+                if category.__module__.partition(".")[0] == PACKAGE:
+                    self.note(str(message))
+                else:
+                    shown(message, category, *place, **more)
+
+            warnings.showwarning = show_warning
+            yield progress
 
 
 Manners = Annotated[Console, Parameter(name="*")]

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
+from .extras import PACKAGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-PACKAGE = "flexpara"
 USER_EXTRAS = ("", "train", "bake", "samples", "formats")
 INSTRUCTION_SETS = ("avx2", "fma", "avx512f", "avx512_bf16", "amx_bf16", "asimd", "bf16")
 

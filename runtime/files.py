@@ -49,7 +49,7 @@ class OutputFolder:
         source: Path | None = None,
         report: str | None = None,
     ) -> None:
-        """Prepare; nothing is created yet.
+        """Prepare; nothing is created or tried yet.
 
         Args:
             folder: where files go; made when absent.
@@ -69,11 +69,17 @@ class OutputFolder:
                 raise InputError(f"{part} is a file, expected a folder for the output; choose another -o")
         self._own = _owned(folder, stem)
         self._staging: Path | None = None
-        self._made_folder = not folder.exists()
+        self._made = tuple(part for part in (folder, *folder.parents) if not part.exists())
         self._entered = False
 
     def __enter__(self) -> Self:
+        """Try the folder, so that what can't be written to is known before the work.
+
+        Raises: InputError.
+        """
         self._entered = True
+        self._stage()
+        self._empty()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -160,7 +166,7 @@ class OutputFolder:
                 _reach_disk(staging / name)
         for name in names:
             (staging / name).replace(self.folder / name)
-        self._made_folder = False
+        self._made = ()
         self._discard()
         return tuple(self.folder / name for name in names)
 
@@ -177,15 +183,21 @@ class OutputFolder:
                 self.folder.mkdir(parents=True, exist_ok=True)
                 self._staging = Path(tempfile.mkdtemp(prefix=STAGING, dir=self.folder))
             except OSError as error:
+                self._discard()
                 raise InputError(f"can't write to {self.folder} ({error.strerror}); choose another -o") from error
         return self._staging
 
-    def _discard(self) -> None:
+    def _empty(self) -> None:
         if self._staging is not None:
             shutil.rmtree(self._staging)
             self._staging = None
-            if self._made_folder and not any(self.folder.iterdir()):
-                self.folder.rmdir()
+
+    def _discard(self) -> None:
+        """Leave nothing behind but what was committed: no hidden folder, and no empty one that was made here."""
+        self._empty()
+        for part in self._made:
+            if part.is_dir() and not any(part.iterdir()):
+                part.rmdir()
 
 
 def replace_file(path: Path, content: bytes) -> None:

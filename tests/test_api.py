@@ -59,7 +59,10 @@ def test_save_writes_what_it_names_and_the_session_reads_it(tmp_path: Path) -> N
     names = {path.name for path in paths}
     assert names == {"mesh.glb", "mesh.obj", "mesh.ply", "mesh.onnx", "mesh.report.json"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == names
-    assert json.loads((tmp_path / "out" / "mesh.report.json").read_text(encoding="utf-8"))["files"] == sorted(names)
+    report = json.loads((tmp_path / "out" / "mesh.report.json").read_text(encoding="utf-8"))
+    assert report["files"] == sorted(names)
+    assert report["outputs"]["formats"] == ["glb", "obj", "ply"]
+    assert report["outputs"]["rays"] == 64
     session = flexpara.runtime.UnwrapSession(tmp_path / "out" / "mesh.onnx")
     uv, chart, score = session.unwrap(VERTICES)
     assert uv.shape == (4, 2)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import warnings
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +16,7 @@ import flexpara
 import flexpara.bake.raster.context
 from flexpara import __main__ as cli
 from flexpara.__main__ import main
+from flexpara.runtime.console import Console
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -229,6 +232,31 @@ def test_bake_takes_the_uv_of_any_mesh(square: Path, tmp_path: Path, capsys: pyt
 def test_quiet_says_nothing(square: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["unwrap", str(square), "-o", str(tmp_path / "out"), "--quiet", *QUICK]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_what_was_dropped_is_said_in_one_line_unless_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = text_file(tmp_path, "dirty.obj", TRIANGLE + "v 9 9 9\nf 1 2 3\nf 1 1 2\n")
+    assert main(["unwrap", str(mesh), "-o", str(tmp_path / "loud"), *QUICK]) == 0
+    line = capsys.readouterr().err
+    assert line.startswith("flexpara: note: dirty: ")
+    assert "1 face without area" in line
+    assert line.count("\n") == 1
+    assert main(["unwrap", str(mesh), "-o", str(tmp_path / "quiet"), "--quiet", *QUICK]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_warning_of_ours_is_a_note_and_nothing_when_quiet(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    class OurWarning(UserWarning):
+        __module__ = "flexpara.bake"
+
+    with pytest.warns(match="of a library") if not quiet else nullcontext(), Console(quiet=quiet).progress():
+        if not quiet:
+            warnings.simplefilter("always")
+        warnings.warn("drawn by numpy", OurWarning, stacklevel=1)
+        warnings.warn("of a library", RuntimeWarning, stacklevel=1)
+    assert capsys.readouterr().err == ("" if quiet else "flexpara: note: drawn by numpy\n")
 
 
 def test_a_foreign_file_is_refused_before_training(

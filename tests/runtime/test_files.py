@@ -57,6 +57,23 @@ def test_an_error_takes_the_new_folder_away_again(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_that_cannot_be_written_to_is_known_before_the_work() -> None:
+    begun = False
+    with (
+        pytest.raises(InputError, match=r"can't write to /proc/none.*choose another -o"),
+        OutputFolder(Path("/proc/none"), "bunny"),
+    ):
+        begun = True
+    assert not begun
+
+
+def test_folders_that_were_made_on_the_way_go_too(tmp_path: Path) -> None:
+    with OutputFolder(tmp_path / "a" / "b" / "c", "bunny"):
+        assert (tmp_path / "a" / "b").is_dir()
+        assert list((tmp_path / "a" / "b" / "c").iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_leaving_without_commit_writes_nothing(tmp_path: Path) -> None:
     with OutputFolder(tmp_path, "bunny") as output:
         output.write("bunny.glb", text("mesh"))
