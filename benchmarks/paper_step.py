@@ -29,7 +29,7 @@ from flexpara.train.paper.config import PaperConfig
 from flexpara.train.paper.global_step import global_loss
 from flexpara.train.paper.multichart_step import chart_loss
 from flexpara.train.paper.networks import GlobalNetworks
-from flexpara.train.paper.training import Run, choose_device
+from flexpara.train.paper.training import Training, choose_device
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -164,7 +164,7 @@ def literal_chart_step(samples: PaperInput, points: Tensor, config: PaperConfig)
 def our_step(samples: PaperInput, config: PaperConfig) -> Callable[[], None]:
     """One step as train_paper takes it."""
     device = choose_device(config)
-    source, run = BatchSource(samples, config, device), Run.begin(config, samples, device)
+    source, run = BatchSource(samples, config, device), Training.begin(config, samples, device)
     networks = run.networks
 
     def step() -> None:

@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ConformalConfig:
-    """How far angles are bought with areas."""
+    """How much distortion of area is accepted for better angles."""
 
     iterations: int = 20
     """SLIM iterations of conformal energy, at most; 0 leaves the map as it is."""
     enough: float = 0.02
     """Conformality (radians) at which they end: a third of the paper's; below, areas are worth more than angles."""
-    dearer: float = 4.0
+    growth: float = 4.0
     """Factor by which the symmetric Dirichlet excess energy may grow …"""
     allowance: float = 0.05
     """… beyond this, which is per area."""
@@ -48,20 +48,20 @@ def conformal_steps(
     contacts hold the chart apart from the last valid map on.
     """
     solver, best, uv = Slim(disk, start, energy=CONFORMAL), start, start
-    dearest = highest_energy(disk, start, config)
+    most_energy = highest_energy(disk, start, config)
     for _ in range(config.iterations // config.block):
         if best is uv and angle_error(disk, best) < config.enough:
             return best
         uv = at_scale_of(disk, solver.run(config.block))
-        if excess_energy(disk, uv) > dearest:
+        if excess_energy(disk, uv) > most_energy:
             break
         if is_valid(disk, uv):
             best = uv
-    return best if best is uv else conformal_contacts(disk, best, dearest, config, contact)
+    return best if best is uv else conformal_contacts(disk, best, most_energy, config, contact)
 
 
 def conformal_contacts(
-    disk: Surface, start: NDArray[np.float64], dearest: float, config: ConformalConfig, contact: ContactConfig
+    disk: Surface, start: NDArray[np.float64], most_energy: float, config: ConformalConfig, contact: ContactConfig
 ) -> NDArray[np.float64]:
     """The uv (v, 2) after single conformal iterations from a valid ``start``, each taken apart before the next."""
     edges, best = boundary_edges(disk.faces), start
@@ -74,15 +74,15 @@ def conformal_contacts(
         if apart is None:
             break
         state, uv = apart, at_scale_of(disk, apart.uv)
-        if not is_valid(disk, uv) or excess_energy(disk, uv) > dearest:
+        if not is_valid(disk, uv) or excess_energy(disk, uv) > most_energy:
             break
         best = uv
     return best
 
 
 def highest_energy(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> float:
-    """The excess energy up to which angles are bought with areas."""
-    return config.dearer * excess_energy(disk, start) + config.allowance * float(disk.face_areas().sum())
+    """The excess energy up to which distortion of area is accepted for better angles."""
+    return config.growth * excess_energy(disk, start) + config.allowance * float(disk.face_areas().sum())
 
 
 def at_scale_of(disk: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:

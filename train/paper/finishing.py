@@ -68,7 +68,7 @@ class GlobalFinishConfig:
     """Angles for areas, before and after the isometric steps."""
 
 
-class Opened(NamedTuple):
+class LearnedDisk(NamedTuple):
     """A component opened into a disk.  Faces are in the component's order.
 
     surface: the disk.  uv (v, 2): learned, both sides of a cut with their vertex's.  torn (f,) bool: in the band.
@@ -147,14 +147,14 @@ def finish_component(
 
 def open_along_seam(
     surface: Surface, ids: NDArray[np.int64], uv: NDArray[np.float64], config: SeamConfig
-) -> tuple[Surface, Opened]:
+) -> tuple[Surface, LearnedDisk]:
     """One component (m,) of faces as a manifold piece, and opened along its seam."""
     faces, old = split_non_manifold_vertices(surface.faces[ids])
     piece, flat = Surface(surface.vertices[old], faces), uv[old]
     table = edge_table(faces)
     torn = tears(piece, flat, config, table).face > config.torn
     opened, source = cut_open(faces, seam_edges(piece, flat, config), table)
-    return piece, Opened(Surface(piece.vertices[source], opened), flat[source], torn)
+    return piece, LearnedDisk(Surface(piece.vertices[source], opened), flat[source], torn)
 
 
 def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> tuple[Slit, ...]:
@@ -171,7 +171,7 @@ def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> 
     return relieve(flat, total_area, relief)[1]
 
 
-def flattened(opened: Opened, slits: tuple[Slit, ...], config: GlobalFinishConfig) -> tuple[Flat | None, str]:
+def flattened(opened: LearnedDisk, slits: tuple[Slit, ...], config: GlobalFinishConfig) -> tuple[Flat | None, str]:
     """The disk with slits, valid, and where it began: "network" or "circle".
 
     None and "none" where neither start is valid.
@@ -207,7 +207,7 @@ def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: Global
     return tries[best][0], states[best]
 
 
-def learned_start(opened: Opened, config: GlobalFinishConfig) -> NDArray[np.float64] | None:
+def learned_start(opened: LearnedDisk, config: GlobalFinishConfig) -> NDArray[np.float64] | None:
     """The network's uv at the disk's scale, the band and what folds laid out anew: valid, or None.
 
     Vertices of the band follow from the others by least squares of conformality (LSCM), so each side of the seam goes
@@ -237,7 +237,7 @@ def learned_start(opened: Opened, config: GlobalFinishConfig) -> NDArray[np.floa
     return None
 
 
-def at_scale(opened: Opened) -> NDArray[np.float64] | None:
+def at_scale(opened: LearnedDisk) -> NDArray[np.float64] | None:
     """The learned uv scaled to the area of the faces outside the band, and mirrored where most of them are flipped."""
     whole = ~opened.torn
     area = signed_areas(opened.uv[opened.surface.faces[whole]])

@@ -53,7 +53,7 @@ def choose_device(config: PaperConfig) -> torch.device:
 
 
 @dataclass(eq=False)
-class Run:
+class Training:
     """What a training step changes: networks, optimizer, and the generator of the batches."""
 
     networks: PaperNetworks
@@ -61,7 +61,7 @@ class Run:
     generator: torch.Generator
 
     @classmethod
-    def begin(cls, config: PaperConfig, samples: PaperInput, device: torch.device) -> Run:
+    def begin(cls, config: PaperConfig, samples: PaperInput, device: torch.device) -> Training:
         """A fresh run."""
         generator = torch.Generator().manual_seed(config.seed)
         networks = make_networks(config, generator)
@@ -116,7 +116,7 @@ def train_paper(
         FlexparaError: training diverged.
     """
     device = choose_device(config)
-    source, run = BatchSource(samples, config, device), Run.begin(config, samples, device)
+    source, run = BatchSource(samples, config, device), Training.begin(config, samples, device)
     sha = samples.sha256() if checkpoints is not None else ""
     if checkpoints is not None and (state := checkpoints.latest(config, sha)) is not None:
         run.restore(state)

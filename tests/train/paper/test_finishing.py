@@ -170,14 +170,14 @@ def test_conformal_steps_end_where_areas_would_cost_more_than_allowed() -> None:
     cap = sample("cloth", 24)
     bent = Surface(cap.vertices * [1.0, 1.0, 3.0], cap.faces)
     uv, area = slim(bent, bent.vertices[:, :2], 50), float(bent.face_areas().sum())
-    free = conformal_steps(bent, uv, replace(CONFORMAL, dearer=1e6), CONTACT)
+    free = conformal_steps(bent, uv, replace(CONFORMAL, growth=1e6), CONTACT)
     limit = 0.5 * (excess_energy(bent, uv) + excess_energy(bent, free))
     assert excess_energy(bent, uv) < limit < excess_energy(bent, free)
-    tight = replace(CONFORMAL, dearer=limit / excess_energy(bent, uv), allowance=0.0, block=1)
+    tight = replace(CONFORMAL, growth=limit / excess_energy(bent, uv), allowance=0.0, block=1)
     found = conformal_steps(bent, uv, tight, CONTACT)
     assert excess_energy(bent, found) <= limit
     still = conformal_steps(
-        bent, uv, replace(tight, dearer=0.0, allowance=0.5 * excess_energy(bent, uv) / area), CONTACT
+        bent, uv, replace(tight, growth=0.0, allowance=0.5 * excess_energy(bent, uv) / area), CONTACT
     )
     assert np.array_equal(still, uv)
 

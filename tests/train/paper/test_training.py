@@ -22,7 +22,7 @@ from flexpara.train.paper.config import Ablation, GlobalWeights, PaperConfig, Pa
 from flexpara.train.paper.global_step import global_loss, global_terms
 from flexpara.train.paper.multichart_step import chart_terms
 from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
-from flexpara.train.paper.training import Run, train_paper
+from flexpara.train.paper.training import Training, train_paper
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -122,7 +122,8 @@ def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
 
 def test_tensors_of_other_networks_are_refused() -> None:
     run, other = (
-        Run.begin(each, surface_input("tube", 16), CPU) for each in (SMALL, replace(SMALL, nets=PaperNets(hidden=8)))
+        Training.begin(each, surface_input("tube", 16), CPU)
+        for each in (SMALL, replace(SMALL, nets=PaperNets(hidden=8)))
     )
     with pytest.raises(InputError, match="differ"):
         run.restore(other.state())
@@ -161,7 +162,7 @@ def test_a_device_that_is_absent_is_named(monkeypatch: pytest.MonkeyPatch) -> No
 def test_each_global_ablation_leaves_its_terms_out(ablation: Ablation, names: set[str]) -> None:
     config = replace(SMALL, ablation=ablation)
     samples = surface_input("tube", 16)
-    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
+    run, source = Training.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
     terms = global_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
@@ -179,7 +180,7 @@ def test_each_global_ablation_leaves_its_terms_out(ablation: Ablation, names: se
 def test_each_multi_chart_ablation_adds_its_terms(ablation: Ablation, names: set[str]) -> None:
     config = replace(SMALL, mode="multi-chart", ablation=ablation)
     samples = surface_input("tube", 16)
-    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
+    run, source = Training.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, MultiChartPaperNetworks)
     terms = chart_terms(run.networks, source.draw(run.generator), config)
     assert set(terms) == names
@@ -190,7 +191,7 @@ def test_each_multi_chart_ablation_adds_its_terms(ablation: Ablation, names: set
 def test_weights_multiply_their_terms() -> None:
     config = replace(SMALL, global_weights=GlobalWeights(1.0, 10.0, 100.0, 1000.0, 10000.0))
     samples = surface_input("tube", 16)
-    run, source = Run.begin(config, samples, CPU), BatchSource(samples, config, CPU)
+    run, source = Training.begin(config, samples, CPU), BatchSource(samples, config, CPU)
     assert isinstance(run.networks, GlobalNetworks)
     batch = source.draw(run.generator)
     terms = global_terms(run.networks, batch, config)
@@ -208,7 +209,7 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
     mesh = surface_input("tube", 16)
     cloud = PaperInput(mesh.points, mesh.normals if oriented else None)
     trained = train_paper(cloud, config, silent)
-    run, source = Run.begin(config, cloud, CPU), BatchSource(cloud, config, CPU)
+    run, source = Training.begin(config, cloud, CPU), BatchSource(cloud, config, CPU)
     batch = source.draw(run.generator)
     assert (batch.triangles is None, batch.normal is None) == (True, not oriented)
     if isinstance(run.networks, GlobalNetworks):
@@ -220,7 +221,7 @@ def test_a_point_cloud_has_no_triangle_and_perhaps_no_normal_term(config: PaperC
 
 def test_compiled_parts_are_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch, "compile", lambda function, **_: lambda *inputs: function(*inputs) + 1.0)
-    networks, xyz = Run.begin(SMALL, surface_input("tube", 16), CPU).networks, torch.zeros(2, 3)
+    networks, xyz = Training.begin(SMALL, surface_input("tube", 16), CPU).networks, torch.zeros(2, 3)
     assert isinstance(networks, GlobalNetworks)
     plain = networks.flatten(xyz)
     training.compile_parts(networks)
