@@ -151,7 +151,7 @@ def seam_edges(piece: Surface, uv: NDArray[np.float64], config: SeamConfig = Sea
     if len(border) == 0:
         mask = prune(table, mask)
     start = np.union1d(border, table.edges[mask]) if mask.any() or len(border) else root
-    mask = with_branches(piece, table, torn, cost, mask, start, config)
+    mask = mask | path_mask(table, branches(piece, table, torn.band, cost, start, config))
     if len(border) == 0 and mask.sum() < 2:  # a closed piece without handles, and no band to open it along
         return far_cut(piece, table, plain, config)
     return mask
@@ -178,20 +178,20 @@ def far_end(piece: Surface, table: EdgeTable, torn: Tears) -> int:
     return int(np.where(np.isfinite(distance), distance, -1.0).argmax())
 
 
-def with_branches(
+def branches(
     piece: Surface,
     table: EdgeTable,
-    torn: Tears,
+    band: NDArray[np.bool_],
     cost: NDArray[np.float64],
-    mask: NDArray[np.bool_],
     start: NDArray[np.int64],
     config: SeamConfig,
-) -> NDArray[np.bool_]:
-    """The seam with the long branches of the band, longest first; each begins on the seam or border, start (b,)."""
+) -> list[list[int]]:
+    """Paths along the long branches of the band (v,), longest first; each begins on the seam or border, start (b,)."""
+    found: list[list[int]] = []
     ends = piece.vertices[table.edges]
     length = np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-300)
     shortest = config.shortest * float(np.sqrt(piece.face_areas().sum()))
-    open_ends = torn.band.copy()
+    open_ends = band.copy()
     for _ in range(config.most):
         distance = shortest_paths(len(piece.vertices), table.edges, length, start).distance
         distance = np.where(open_ends & np.isfinite(distance), distance, 0.0)
@@ -199,9 +199,9 @@ def with_branches(
         if distance[target] < shortest:
             break
         path = trace_back(shortest_paths(len(piece.vertices), table.edges, cost, start).parent, target)
-        if len(path) > 2 and torn.band[path].mean() >= config.within:
-            mask = mask | path_mask(table, [path])
+        if len(path) > 2 and band[path].mean() >= config.within:
+            found.append(path)
             start = np.union1d(start, path)
         else:
             open_ends &= np.linalg.norm(piece.vertices - piece.vertices[target], axis=1) > shortest
-    return mask
+    return found
