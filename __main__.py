@@ -136,7 +136,7 @@ def train(
     options: Annotated[TrainOptions, CHARTS] = TrainOptions(),
     console: Manners = Console(),
 ) -> int:
-    """The first half of unwrap: charts and networks, as STEM.trained.safetensors for flexpara export.
+    """Do the first half of unwrap: find charts and networks, and write STEM.trained.safetensors for flexpara export.
 
     Args:
         mesh: Any mesh that unwrap takes.
@@ -175,7 +175,7 @@ def export(
     outputs: Annotated[Outputs, FILES] = Outputs(),
     console: Manners = Console(),
 ) -> int:
-    """The second half of unwrap: pack what flexpara train found, export the ONNX file, write the mesh, bake.
+    """Do the second half of unwrap: pack what flexpara train found, export the ONNX file, write the mesh, bake.
 
     Args:
         trained: STEM.trained.safetensors.
@@ -206,9 +206,9 @@ def export(
 
 @app.command
 def doctor() -> int:
-    """Versions, CPU features, torch device, ONNX providers, OpenGL renderer, and how to mend what is missing.
+    """Show versions, CPU features, torch device, ONNX providers, OpenGL renderer, and how to install what is missing.
 
-    Ends with 0 whatever it finds; what is missing is marked ✗ and followed by its remedy.
+    The command ends with 0 whatever it finds. What is missing is marked ✗ and followed by its remedy.
     """
     from .runtime.doctor import Finding, cpu, onnx_providers, packages, probe
 

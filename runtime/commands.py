@@ -17,7 +17,7 @@ SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
 
 
 def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) -> int:
-    """Chart and uv of any points of an unwrapped surface, without torch and without the mesh.
+    """Find chart and uv of any points of an unwrapped surface, without torch and without the mesh.
 
     Args:
         bundle: The ONNX file that unwrap wrote.
@@ -40,7 +40,7 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
 def evaluate(
     mesh: Path, *, size: int | None = None, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
 ) -> int:
-    """Metrics of a mesh with uv, whoever made it.
+    """Measure a mesh that has uv, whoever made them.
 
     Args:
         mesh: A mesh with uv.

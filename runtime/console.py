@@ -59,7 +59,7 @@ class Console:
             self.note(f"{source.stem}: {fact}")
 
     def note(self, fact: str) -> None:
-        """One line on stderr about something the user should know and need not mend; nothing when quiet."""
+        """One line on stderr about something that the user should know and need not act on; nothing when quiet."""
         if not self.quiet:
             sys.stderr.write(f"flexpara: note: {' '.join(fact.split())}\n")
 

@@ -1,4 +1,4 @@
-"""What is installed on this machine, and how to mend what is missing."""
+"""What is installed on this machine, and how to install what is missing."""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -88,3 +90,16 @@ def test_what_cannot_be_done_ends_with_2_and_leaves_nothing(
     assert main(["bake", str(square), "-o", str(out), "--size", "32", "--quiet", *words]) == 2
     assert "error:" in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
+
+
+@pytest.mark.parametrize("words", [["--maps", "position"], ["--maps", "position", "--layers"]])
+def test_a_file_that_finds_no_room_ends_with_2_and_leaves_nothing(words: list[str], square: Path) -> None:
+    limit = "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)"
+    limit += "; resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))"
+    argv = ["bake", str(square), "-o", str(square.parent / "out"), "--size", "256", *words]
+    code = f"{limit}; import sys; from flexpara.__main__ import main; sys.exit(main({argv!r}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "expected" in done.stderr
+    assert done.stderr.startswith("flexpara: error: square")
+    assert not (square.parent / "out").exists()

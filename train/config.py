@@ -47,7 +47,7 @@ class JointConfig:
     batch: int = 512
     """Surface samples a step."""
     peak_rate: float = 4e-3
-    """Peak learning rate of the one-cycle schedule (AdamW)."""
+    """Peak learning rate of the one-cycle schedule (Adam)."""
     distortion_weight: float = 1.0
     """Weight of the ARAP energy of the 3D → 2D map."""
     cycle_weight: float = 10.0

@@ -85,7 +85,9 @@ def write_layers(
     output = oiio.ImageOutput.create(str(path))
     if output is None or not (output.open(str(path), spec) and output.write_image(pixels) and output.close()):
         reason = oiio.geterror() if output is None else output.geterror()
-        raise EncodingError(f"{path}: could not be written ({reason}); is the folder writable, the disk full?")
+        raise EncodingError(
+            f"{path.name}: could not be written ({reason}), expected room for it; free some, or choose another folder"
+        )
 
 
 def file_metadata(asset: Asset, *, normal_format: str = "opengl", uv_set: str = "TEXCOORD_0") -> dict[str, str]:

@@ -207,6 +207,7 @@ def _write(path: Path, levels: NDArray[np.generic], attributes: dict[str, str | 
         raise FlexparaError(f"{path}: OpenImageIO has no writer for this ending ({oiio.geterror()}); use .png or .exr")
     done = output.open(str(path), spec) and output.write_image(np.ascontiguousarray(levels)) and output.close()
     if not done:
-        raise FlexparaError(
-            f"{path}: could not be written ({output.geterror()}); is the folder writable, the disk full?"
+        raise EncodingError(
+            f"{path.name}: could not be written ({output.geterror()}), expected a folder with room for it; free some "
+            "space, or choose another"
         )
