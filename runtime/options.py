@@ -10,6 +10,7 @@ Annotations are evaluated here, unlike in other modules: cyclopts reads those of
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -261,20 +262,26 @@ def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str
 
     Raises: InputError for an unknown keyword, or a value that its field refuses.
     """
-    start = kind() if made is None else made
-    defaults = {field.name: field.default for field in fields(kind)}  # pyright: ignore[reportArgumentType]
+    start: Any = kind() if made is None else made
+    known = {field.name: field.default for field in fields(start)}
     for name in keywords:
-        close = get_close_matches(name, defaults, 1)
+        close = get_close_matches(name, known, 1)
         remedy = f"pass {close[0]}" if close else "leave it out"
-        demand(name in defaults, f"{name} is no option, expected some of {', '.join(sorted(defaults))}; {remedy}")
-    values = {
-        name: _as_names(value) if isinstance(defaults[name], tuple) else value for name, value in keywords.items()
-    }
-    return replace(start, **values)  # pyright: ignore[reportArgumentType]
+        demand(name in known, f"{name} is no option, expected some of {', '.join(sorted(known))}; {remedy}")
+    try:
+        return replace(start, **{name: _as_field(name, known[name], value) for name, value in keywords.items()})
+    except TypeError as error:
+        raise InputError(f"an option has the wrong type ({error}), expected those of {kind.__name__}") from error
 
 
-def _as_names(value: str | Sequence[str]) -> tuple[str, ...]:
-    return names(value) if isinstance(value, str) else tuple(value)
+def _as_field(name: str, default: object, value: Any) -> Any:
+    """The value as the field holds it: integers of numpy as int, several names as a tuple."""
+    if isinstance(default, tuple):
+        return names(value) if isinstance(value, str) else tuple(value)
+    plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+    fits = default is None or type(plain) is type(default)
+    demand(fits, f"{name} is {value!r}, expected a value like {default!r}; pass one of type {type(default).__name__}")
+    return plain
 
 
 def demand_known(name: str, value: str, known: Sequence[str]) -> None:

@@ -124,3 +124,16 @@ def test_keywords_replace_fields_of_what_was_made() -> None:
     assert from_keywords(Outputs, None, {"maps": "ao, normal", "formats": ["obj"]}).maps == ("ao", "normal")
     with pytest.raises(InputError, match="seed is -1"):
         from_keywords(Options, made, {"seed": -1})
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"charts": "8"}, {"charts": 2.5}, {"seed": True}, {"padding": "4"}, {"preset": None}]
+)
+def test_a_keyword_of_another_type_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="expected"):
+        from_keywords(Options, None, wrong)
+
+
+def test_an_integer_of_numpy_is_an_integer() -> None:
+    charts = from_keywords(Options, None, {"charts": np.int64(5)}).charts
+    assert (charts, type(charts)) == (5, int)
