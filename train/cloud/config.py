@@ -26,9 +26,9 @@ class CloudConfig:
     """Nearest points along whose links orientation spreads."""
     doubtful: float = 0.5
     """A fitted plane whose cosine with the file's normal is smaller gives way to that normal."""
-    telling: float = 0.5
+    decisive: float = 0.5
     """Two linked normals whose cosine is smaller in size say nothing about orientation."""
-    unruly: float = 0.2
+    reorient: float = 0.2
     """`normals.disagreement` from which on the normals of a file are oriented anew (random signs have 0.5)."""
     star_points: int = 20
     """The most neighbours on the hull of a Delaunay star; stars with more are left open there."""

@@ -171,12 +171,12 @@ def disagreement(
         config: numbers.
     """
     one, other, agreement = _links(points, normals, index)
-    turned = agreement < -config.telling
+    turned = agreement < -config.decisive
     if not turned.any():
         return 0.0
     way = points[other[turned]] - points[one[turned]]
     side = np.sign(np.einsum("mc,mc->m", way, normals[one[turned]]))
-    return float(turned.sum() / np.count_nonzero(np.abs(agreement) > config.telling) * (1.0 - np.abs(side.mean())))
+    return float(turned.sum() / np.count_nonzero(np.abs(agreement) > config.decisive) * (1.0 - np.abs(side.mean())))
 
 
 def _links(

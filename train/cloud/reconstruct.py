@@ -118,12 +118,12 @@ def _local(distinct: DistinctPoints, config: CloudConfig) -> _Local:
         chosen = chosen[np.flatnonzero(apart)]
     given = None if distinct.normals is None else distinct.normals[chosen]
     links = index[:, : config.tree_neighbours]
-    unruly = given is not None and disagreement(points, given, links, config) > config.unruly
-    normals = fitted_normals(points, index, distance, config, None if unruly else given)
-    if given is None or unruly or not given.any(axis=1).all():
+    disordered = given is not None and disagreement(points, given, links, config) > config.reorient
+    normals = fitted_normals(points, index, distance, config, None if disordered else given)
+    if given is None or disordered or not given.any(axis=1).all():
         normals = oriented_normals(points, normals, index, spacing, config)
-        normals = normals if given is None or unruly else turned_to(normals, given, index)
-    return _Local(chosen, points, normals, index, spacing, unruly)
+        normals = normals if given is None or disordered else turned_to(normals, given, index)
+    return _Local(chosen, points, normals, index, spacing, disordered)
 
 
 def triangulated(
@@ -149,7 +149,7 @@ def triangulated(
         if len(closing) == 0 and len(whole) == len(faces):
             break
         faces = whole
-    return _without_crumbs(faces, config.least_faces)
+    return _without_small_pieces(faces, config.least_faces)
 
 
 def assembled(found: Candidates, count: int) -> NDArray[np.int64]:
@@ -194,7 +194,7 @@ def without_pinches(points: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
         faces = faces[~smaller[split].any(axis=1)]
 
 
-def _without_crumbs(faces: NDArray[np.int64], least: int) -> NDArray[np.int64]:
+def _without_small_pieces(faces: NDArray[np.int64], least: int) -> NDArray[np.int64]:
     """The faces without pieces of fewer than least of them; where all are so small, the largest stays."""
     if len(faces) == 0:
         return faces
