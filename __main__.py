@@ -123,6 +123,7 @@ def _perform(run: Run, console: Console) -> int:
             written = result.write(folder, run.outputs, progress)
     if result.cloud is not None:
         console.note_changes(result.asset)
+    console.notes(result.report["train"])
     run.forget()
     console.show({**result.report["metrics"], **result.report["network"]}, written)
     return 0
@@ -161,6 +162,7 @@ def train(
         facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}
         folder.write_report(facts)
         written = folder.commit()
+    console.notes(trained.report)
     console.show({}, written)
     return 0
 

@@ -15,7 +15,7 @@ from .options import Flag
 from .progress import progress_bars
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from .io.points.cloud import PointCloud
@@ -62,6 +62,11 @@ class Console:
         """One line on stderr about something that the user should know and need not act on; nothing when quiet."""
         if not self.quiet:
             sys.stderr.write(f"flexpara: note: {' '.join(fact.split())}\n")
+
+    def notes(self, report: Mapping[str, Any]) -> None:
+        """The sentences under "notes" of a stage's report: what it did that the user may not expect."""
+        for fact in report.get("notes", ()):
+            self.note(str(fact))
 
     @contextmanager
     def progress(self) -> Iterator[Progress | None]:

@@ -246,6 +246,15 @@ def test_what_was_dropped_is_said_in_one_line_unless_quiet(tmp_path: Path, capsy
     assert capsys.readouterr() == ("", "")
 
 
+def test_notes_of_a_report_are_said_one_a_line_unless_quiet(capsys: pytest.CaptureFixture[str]) -> None:
+    report = {"notes": ["12 charts were needed", "a slit was made"], "objective": 1.0}
+    Console().notes(report)
+    assert capsys.readouterr().err == "flexpara: note: 12 charts were needed\nflexpara: note: a slit was made\n"
+    Console(quiet=True).notes(report)
+    Console().notes({})
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_warning_of_ours_is_a_note_and_nothing_when_quiet(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
     class OurWarning(UserWarning):

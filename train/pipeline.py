@@ -34,7 +34,8 @@ class Trained:
     """Result of training.
 
     charts: valid, in source units.  networks: unit ball → logits (n, p) and chart uv (n, p, 2) in source units.
-    frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.
+    frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.  The sentences under
+    "notes" of the report are shown to the user.
     paper: the networks of preset paper as they were trained: unit ball → logits (n, p), raw uv (n, p, 2); else None.
     """
 
