@@ -18,6 +18,11 @@ from .checks import check_outputs, chosen_maps, padding_of
 from .output import bake_textures, bleeding, texture_facts, with_tangents
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..runtime.files import OutputFolder
+    from ..runtime.mesh import Asset, Atlas
+    from .bakemap import BakeMap
     from .highpoly.highmaps import HighSource
 
 
@@ -57,6 +62,10 @@ class HighOptions:
     faces."""
     match_names: Flag = False
     """Let each part of the low-poly mesh see only the high-poly parts that have its name."""
+
+    def __post_init__(self) -> None:
+        alone = not self.high and (self.cage, self.match_names) != (HighOptions.cage, HighOptions.match_names)
+        demand(not alone, "cage or match-names without high, expected a high-poly mesh; add --high, or leave them out")
 
 
 def bake(
@@ -100,13 +109,7 @@ def bake(
         check_outputs(folder, outputs, entries, meshes=False)
         with console.progress() as progress:
             if options.udim:
-                from .udim import bake_udim, write_udim
-
-                sizes = {"size": options.size, "padding": options.margin, "samples": options.samples}
-                tiles = bake_udim(atlas, asset, entries, **sizes)
-                kind = options.texture_format
-                folder.write_several(lambda path: write_udim(tiles, path, asset.stem, file_type=kind))
-                facts["tiles"] = list(tiles)
+                facts["tiles"] = _bake_squares(folder, atlas, asset, entries, options)
             else:
                 baked = bake_textures(folder, atlas, asset, outputs, entries, Clock(progress))
                 facts["textures"] = texture_facts(atlas, baked)
@@ -117,6 +120,18 @@ def bake(
     console.show({}, written)
     console.show({} if high is None else high.report(), ())
     return 0
+
+
+def _bake_squares(
+    folder: OutputFolder, atlas: Atlas, asset: Asset, maps: Sequence[BakeMap], options: BakeOptions
+) -> list[int]:
+    """Bake and write one image for each map and square of uv; returns the squares' numbers."""
+    from .udim import bake_udim, write_udim
+
+    tiles = bake_udim(atlas, asset, list(maps), size=options.size, padding=options.margin, samples=options.samples)
+    kind = options.texture_format
+    folder.write_several(lambda path: write_udim(tiles, path, asset.stem, file_type=kind))
+    return list(tiles)
 
 
 def settings(options: BakeOptions, source: HighOptions) -> dict[str, Any]:

@@ -194,6 +194,8 @@ class MapOptions:
         demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
         demand(self.samples in (1, 4, 16), f"samples is {self.samples}, expected 1, 4 or 16; choose one of them")
         demand(1 <= self.rays <= 4096, f"rays is {self.rays}, expected 1 to 4096; pass for instance --rays 64")
+        plain = (self.exr_bits, self.exr_compression) == (MapOptions.exr_bits, MapOptions.exr_compression)
+        demand(self.layers or plain, "exr-bits or exr-compression without layers, expected both; add --layers")
         both = self.layers and self.target is not None
         demand(not both, f"layers with target {self.target}, expected one of the two; leave the other out")
 

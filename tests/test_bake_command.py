@@ -42,8 +42,8 @@ def test_a_target_names_its_files(square: Path) -> None:
 
 
 def test_every_option_is_in_the_report(square: Path) -> None:
-    _, report = baked(square, "--maps", "position", "--normal-format", "directx", "--exr-bits", "16", "--seed", "7")
-    asked = {"normal_format": "directx", "exr_bits": 16, "seed": 7, "maps": ["position"], "padding": 2, "high": []}
+    _, report = baked(square, "--maps", "position", "--normal-format", "directx", "--rays", "9", "--seed", "7")
+    asked = {"normal_format": "directx", "rays": 9, "seed": 7, "maps": ["position"], "padding": 2, "high": []}
     assert {name: report["settings"][name] for name in asked} == asked
     assert {"udim", "cage", "match_names", "fields", "layers", "texture_format"} <= set(report["settings"])
 
@@ -81,6 +81,9 @@ def test_a_high_poly_mesh_gives_the_height(square: Path) -> None:
         ["--layers", "--exr-compression", "jpeg"],
         ["--maps", "height"],
         ["--high", "absent.obj"],
+        ["--cage", "0.1"],
+        ["--match-names"],
+        ["--exr-bits", "16"],
     ],
 )
 def test_what_cannot_be_done_ends_with_2_and_leaves_nothing(
