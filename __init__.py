@@ -124,13 +124,10 @@ def unwrap_cloud(
 
     with requires("train"):
         from .export.assemble import assemble
-        from .train.cloud.reconstruct import reconstruct
-        from .train.presets import train_asset
+        from .train.presets import train_cloud
 
     clock = Clock(progress)
-    with clock.stage("triangulate"):
-        mesh = reconstruct(cloud)
-    trained = train_asset(mesh.asset, options, clock, keep, cloud)
+    mesh, trained = train_cloud(cloud, options, clock, keep)
     found = assemble(mesh.asset, trained, clock, size=options.size, padding=options.margin)
     return UnwrapResult(mesh.asset, found, cloud, mesh)
 

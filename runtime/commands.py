@@ -38,7 +38,10 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
 
 
 def evaluate(
-    mesh: Path, *, size: int | None = None, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
+    mesh: Path,
+    *,
+    size: int | None = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
 ) -> int:
     """Measure a mesh that has uv, whoever made them.
 

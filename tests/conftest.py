@@ -11,7 +11,6 @@ from collections import Counter
 from dataclasses import asdict
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -99,15 +98,16 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     from flexpara.train import presets
     from flexpara.train.config import NetConfig, TrainConfig
     from flexpara.train.learn.networks import AtlasNetworks
+    from flexpara.train.pipeline import Trained
 
     trained: list[Surface] = []
 
-    def train(surface: Surface, settings: TrainConfig, progress: Progress | None = None) -> SimpleNamespace:
+    def train(surface: Surface, settings: TrainConfig, progress: Progress | None = None) -> Trained:
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)
         none = np.zeros(len(surface.faces), np.int64)
-        return SimpleNamespace(
+        return Trained(
             charts=Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",)),
             networks=AtlasNetworks(1, NetConfig(), generator=torch.Generator().manual_seed(0)),
             frame=Frame.of(surface.vertices),

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import warnings
-from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +14,6 @@ import flexpara
 import flexpara.bake.raster.context
 from flexpara import __main__ as cli
 from flexpara.__main__ import main
-from flexpara.runtime.console import Console
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -244,28 +241,6 @@ def test_what_was_dropped_is_said_in_one_line_unless_quiet(tmp_path: Path, capsy
     assert line.count("\n") == 1
     assert main(["unwrap", str(mesh), "-o", str(tmp_path / "quiet"), "--quiet", *QUICK]) == 0
     assert capsys.readouterr() == ("", "")
-
-
-def test_notes_of_a_report_are_said_one_a_line_unless_quiet(capsys: pytest.CaptureFixture[str]) -> None:
-    report = {"notes": ["12 charts were needed", "a slit was made"], "objective": 1.0}
-    Console().notes(report)
-    assert capsys.readouterr().err == "flexpara: note: 12 charts were needed\nflexpara: note: a slit was made\n"
-    Console(quiet=True).notes(report)
-    Console().notes({})
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize("quiet", [False, True])
-def test_a_warning_of_ours_is_a_note_and_nothing_when_quiet(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    class OurWarning(UserWarning):
-        __module__ = "flexpara.bake"
-
-    with pytest.warns(match="of a library") if not quiet else nullcontext(), Console(quiet=quiet).progress():
-        if not quiet:
-            warnings.simplefilter("always")
-        warnings.warn("drawn by numpy", OurWarning, stacklevel=1)
-        warnings.warn("of a library", RuntimeWarning, stacklevel=1)
-    assert capsys.readouterr().err == ("" if quiet else "flexpara: note: drawn by numpy\n")
 
 
 def test_a_foreign_file_is_refused_before_training(

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ..runtime.mesh import Frame
+from .cloud.config import CloudConfig
+from .cloud.reconstruct import reconstruct
 from .config import TrainConfig
 from .paper.config import Ablation, PaperConfig
 from .pipeline import train
@@ -16,7 +18,7 @@ from .pipeline import train
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..runtime.io.points.cloud import PointCloud
+    from ..runtime.io.points.cloud import CloudMesh, PointCloud
     from ..runtime.mesh import Asset
     from ..runtime.options import TrainOptions
     from ..runtime.progress import Clock
@@ -51,6 +53,20 @@ def train_asset(
         samples = PaperInput(ball, None if cloud.normals is None else asset.normals)
     checkpoints = None if keep is None else Checkpoints(*keep)
     return train_paper_surface(asset.surface, paper_config(options), clock, checkpoints, samples=samples)
+
+
+def train_cloud(
+    cloud: PointCloud, options: TrainOptions, clock: Clock, keep: Keep | None = None
+) -> tuple[CloudMesh, Trained]:
+    """Triangles laid over the points of a cloud, and their charts and networks; the settings hold both's numbers.
+
+    Raises: as train_asset; MeshError where the points show no surface.
+    """
+    config = CloudConfig()
+    with clock.stage("triangulate"):
+        mesh = reconstruct(cloud, config)
+    trained = train_asset(mesh.asset, options, clock, keep, cloud)
+    return mesh, replace(trained, settings={**trained.settings, "cloud": asdict(config)})
 
 
 def paper_config(options: TrainOptions) -> PaperConfig:

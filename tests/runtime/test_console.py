@@ -1,0 +1,41 @@
+"""What the command line says on stderr beside errors: notes, one a line, and none when quiet."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import nullcontext
+
+import pytest
+
+from flexpara.runtime.console import Console
+
+
+def test_changes_that_take_nothing_are_not_worth_a_note(capsys: pytest.CaptureFixture[str]) -> None:
+    Console().note_changes("a.obj", {"welded_vertices": 4, "components": 2})
+    assert capsys.readouterr().err == ""
+    Console().note_changes("a.obj", {"welded_vertices": 4, "duplicate_faces": 2, "degenerate_faces": 1})
+    line = capsys.readouterr().err
+    assert line.startswith("flexpara: note: a.obj ")
+    assert "2 duplicate faces, 1 degenerate faces;" in line
+
+
+def test_notes_of_a_report_are_said_one_a_line_unless_quiet(capsys: pytest.CaptureFixture[str]) -> None:
+    report = {"notes": ["12 charts were needed", "a slit was made"], "objective": 1.0}
+    Console().notes(report)
+    assert capsys.readouterr().err == "flexpara: note: 12 charts were needed\nflexpara: note: a slit was made\n"
+    Console(quiet=True).notes(report)
+    Console().notes({})
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_warning_of_ours_is_a_note_and_nothing_when_quiet(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    class OurWarning(UserWarning):
+        __module__ = "flexpara.bake"
+
+    with pytest.warns(match="of a library") if not quiet else nullcontext(), Console(quiet=quiet).progress():
+        if not quiet:
+            warnings.simplefilter("always")
+        warnings.warn("drawn by numpy", OurWarning, stacklevel=1)
+        warnings.warn("of a library", RuntimeWarning, stacklevel=1)
+    assert capsys.readouterr().err == ("" if quiet else "flexpara: note: drawn by numpy\n")
