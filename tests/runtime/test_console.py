@@ -10,15 +10,6 @@ import pytest
 from flexpara.runtime.console import Console
 
 
-def test_changes_that_take_nothing_are_not_worth_a_note(capsys: pytest.CaptureFixture[str]) -> None:
-    Console().note_changes("a.obj", {"welded_vertices": 4, "components": 2})
-    assert capsys.readouterr().err == ""
-    Console().note_changes("a.obj", {"welded_vertices": 4, "duplicate_faces": 2, "degenerate_faces": 1})
-    line = capsys.readouterr().err
-    assert line.startswith("flexpara: note: a.obj ")
-    assert "2 duplicate faces, 1 degenerate faces;" in line
-
-
 def test_notes_of_a_report_are_said_one_a_line_unless_quiet(capsys: pytest.CaptureFixture[str]) -> None:
     report = {"notes": ["12 charts were needed", "a slit was made"], "objective": 1.0}
     Console().notes(report)
