@@ -36,6 +36,10 @@ class StartConfig:
     """Lloyd iterations."""
     fit_steps: int = 100
     """Steps of fitting the networks to cluster labels and plane projections."""
+    fit_rate: float = 5e-3
+    """Peak learning rate of that fit."""
+    fit_normal_weight: float = 0.1
+    """Weight of the squared gap of normals in that fit, beside those of uv and position."""
 
 
 @dataclass(frozen=True)

@@ -47,22 +47,21 @@ class SampleBank:
         return torch.randint(len(self.xyz), (count,), generator=self.generator)
 
 
-def fit_start(
-    networks: MultiChartNetworks, bank: SampleBank, label: Tensor, uv: Tensor, steps: int, batch: int
-) -> None:
+def fit_start(networks: MultiChartNetworks, bank: SampleBank, label: Tensor, uv: Tensor, config: TrainConfig) -> None:
     """Teach the networks the start, in place: label (n,) int64 by cross-entropy, uv (p, n, 2) and the way back.
 
     Each point counts on its own patch only.
     """
-    optimizer = OneCycleAdam(networks, steps, 5e-3)
+    steps, weight = config.start.fit_steps, config.start.fit_normal_weight
+    optimizer = OneCycleAdam(networks, steps, config.start.fit_rate)
     for _ in range(steps):
-        pick = bank.draw(batch)
+        pick = bank.draw(config.joint.batch)
         feature = nn.functional.silu(networks.embedding(bank.xyz[pick]))
         own = nn.functional.one_hot(label[pick], uv.shape[0]).T.to(uv.dtype)
         flat = networks.unwrap(feature)
         wrapped = networks.wrap(uv[:, pick])
         gap = ((flat - uv[:, pick]) ** 2).sum(-1) + ((wrapped[..., :3] - bank.xyz[pick]) ** 2).sum(-1)
-        gap = gap + 0.1 * ((wrapped[..., 3:] - bank.normal[pick]) ** 2).sum(-1)
+        gap = gap + weight * ((wrapped[..., 3:] - bank.normal[pick]) ** 2).sum(-1)
         loss = weighted_mean(gap, own) + nn.functional.cross_entropy(networks.assign(feature), label[pick])
         optimizer.step(loss)
 
@@ -79,14 +78,7 @@ def train_jointly(
     bank = SampleBank(samples, generator)
     label = cluster(samples.xyz, samples.normal, config.charts, config.start, rng)
     uv = plane_projection(samples.xyz, samples.normal, label, config.charts)
-    fit_start(
-        networks,
-        bank,
-        torch.from_numpy(label),
-        torch.from_numpy(uv.astype(np.float32)),
-        config.start.fit_steps,
-        config.joint.batch,
-    )
+    fit_start(networks, bank, torch.from_numpy(label), torch.from_numpy(uv.astype(np.float32)), config)
     optimizer = OneCycleAdam(networks, config.joint.steps, config.joint.peak_rate)
     for step in range(config.joint.steps):
         pick = bank.draw(config.joint.batch)

@@ -107,7 +107,8 @@ def test_the_networks_learn_the_geometric_start() -> None:
     label = cluster(samples.xyz, samples.normal, 4, CONFIG.start, np.random.default_rng(0))
     uv = plane_projection(samples.xyz, samples.normal, label, 4)
     bank = SampleBank(samples, seeded())
-    fit_start(networks, bank, torch.from_numpy(label), torch.from_numpy(uv.astype(np.float32)), 150, 512)
+    config = replace(CONFIG, start=StartConfig(fit_steps=150), joint=JointConfig(batch=512))
+    fit_start(networks, bank, torch.from_numpy(label), torch.from_numpy(uv.astype(np.float32)), config)
     with torch.no_grad():
         cycle = networks(bank.xyz, bank.tangents)
     own = label, np.arange(len(label))
