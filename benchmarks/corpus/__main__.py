@@ -16,6 +16,7 @@ import argparse
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
@@ -23,17 +24,21 @@ import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import tables
-from .processes import ROOT, run
+from .processes import ROOT, end_all, run
 from .tables import Row
+
+if TYPE_CHECKING:
+    from types import FrameType
 
 SUFFIXES = {".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf", ".dae", ".usda", ".usdz"}
 UNWRAP = ("--maps", "none", "--format", "glb,obj", "--no-preview", "--quiet")
 PEERS = ("xatlas", "uvunwrap")
 JUDGE_LIMIT = 600.0
 BARS = "seconds<=60 peak_mb<=1024 stretch<=1.1"
+FILE_BARS = Path(__file__).with_name("bars.json")
 DEFECTS = ("collapsed", "flips", "degenerate", "overlap", "outside")
 
 
@@ -44,7 +49,13 @@ def unwrapped(path: Path, name: str, arguments: argparse.Namespace, folder: Path
     ended = run([*command, *shlex.split(arguments.options)], arguments.limit)
     status = {None: "timeout", 0: "ok", 2: "refused"}.get(ended.code, f"exit {ended.code}")
     row: Row = {"file": name, "tool": "flexpara", "status": status, "code": ended.code, "seconds": ended.seconds}
-    row |= {"peak_mb": ended.peak_mb, "said": ended.said, "stderr_lines": ended.lines, "jobs": arguments.jobs}
+    row |= {
+        "cpu_seconds": ended.cpu_seconds,
+        "peak_mb": ended.peak_mb,
+        "said": ended.said,
+        "stderr_lines": ended.lines,
+        "jobs": arguments.jobs,
+    }
     if status != "ok":
         return row
     reports = list(out.glob("*.report.json"))
@@ -53,7 +64,7 @@ def unwrapped(path: Path, name: str, arguments: argparse.Namespace, folder: Path
         names = ", ".join(sorted(path.name for path in out.iterdir()))
         return row | {"status": "unjudged", "said": f"a report, a glb and an obj were expected, found {names}"}
     row |= from_report(json.loads(reports[0].read_text(encoding="utf-8")))
-    return row | from_files(written, arguments, folder)
+    return row | from_files(str(path), written, arguments, folder)
 
 
 def from_report(report: dict[str, Any]) -> Row:
@@ -70,10 +81,10 @@ def from_report(report: dict[str, Any]) -> Row:
     }
 
 
-def from_files(written: list[Path], arguments: argparse.Namespace, folder: Path) -> Row:
+def from_files(source: str, written: list[Path], arguments: argparse.Namespace, folder: Path) -> Row:
     """The judge's columns: of the first file, but of each defect the worst of all."""
     result = folder / "judged.json"
-    command = [sys.executable, "-m", "benchmarks.corpus.judge", str(result), arguments.evaluator]
+    command = [sys.executable, "-m", "benchmarks.corpus.judge", str(result), arguments.evaluator, source]
     ended = run([*command, *map(str, written)], JUDGE_LIMIT)
     if ended.code != 0:
         return {"status": "unjudged", "said": f"the judge ended with {ended.code}: {ended.said}"}
@@ -99,7 +110,7 @@ def by_peer(tool: str, path: Path, name: str, arguments: argparse.Namespace, fol
         status = {None: "timeout", 2: "refused"}.get(ended.code, f"exit {ended.code}")
         return row | {"status": status, "seconds": ended.seconds, "said": ended.said}
     seconds = json.loads(answer.with_suffix(".json").read_text(encoding="utf-8"))["seconds"]
-    return row | {"seconds": seconds, "peak_mb": ended.peak_mb} | from_files([answer], arguments, folder)
+    return row | {"seconds": seconds, "peak_mb": ended.peak_mb} | from_files("none", [answer], arguments, folder)
 
 
 def all_rows(arguments: argparse.Namespace, known: list[Row]) -> list[Row]:
@@ -153,7 +164,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     add("--options", default="", help='more options of flexpara unwrap, e.g. "--charts 1"')
     add("--evaluator", default=str(evaluator), help="file with evaluate(vertices, faces, corner_uv), or none")
     add("--bars", default=BARS, help="what every file must hold, beside being valid")
-    add("--file-bars", type=Path, help='JSON: {"simple/plane.obj": ["charts<=1"], …}, patterns allowed')
+    add("--file-bars", type=Path, default=FILE_BARS, help='JSON: {"simple/plane.obj": ["charts<=1"], …}; or patterns')
     add("--compare", type=Path, help="results.jsonl of an earlier run")
     add("--keep", action="store_true", help="keep what flexpara wrote, under files/ of the output folder")
     add("--again", action="store_true", help="forget earlier results of these files")
@@ -180,6 +191,12 @@ def meshes(item: Path) -> list[tuple[Path, str]]:
     return [(path, f"{path.parent.name}/{path.name}") for path in found]
 
 
+def interrupted(number: int, _frame: FrameType | None) -> None:
+    """End at once, with everything that runs; rows that are written stay."""
+    end_all()
+    os._exit(128 + number)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run, report, and say what is missed."""
     arguments = parse(argv)
@@ -191,7 +208,7 @@ def main(argv: list[str] | None = None) -> int:
     print(f"{facts['cpu']}, {facts['cores']} cores · commit {facts['commit']} · {len(names)} files")
     print(f"{sum(row['file'] in names for row in known)} rows are there from before\n\n{tables.header()}", flush=True)
     rows = all_rows(arguments, known)
-    own = json.loads(arguments.file_bars.read_text(encoding="utf-8")) if arguments.file_bars else None
+    own = json.loads(arguments.file_bars.read_text(encoding="utf-8"))
     missed = tables.violations(rows, arguments.bars.split(), own)
     closing = [*tables.summary(rows), "", f"Missed by {len(missed)} files:" if missed else "Every bar is met."]
     closing += [f"- {text}" for text in missed]
@@ -206,4 +223,6 @@ def main(argv: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupted)
     sys.exit(main())

@@ -1,4 +1,4 @@
-"""Metrics of uv as they stand in written files: `python -m benchmarks.corpus.judge RESULT.json EVALUATOR FILE…`.
+"""Metrics of uv as they stand in written files: `-m benchmarks.corpus.judge RESULT.json EVALUATOR SOURCE FILE…`.
 
 f faces.  Files are read by trimesh, each geometry once; vertices of equal position are one.  A .npz holds vertices,
 faces and corner_uv (a peer's answer).  EVALUATOR is a Python file with `evaluate(vertices, faces, corner_uv)`, such as
@@ -6,6 +6,7 @@ the `uveval.py` that judges this project from outside, or `none`; what both it a
 kept side by side.  stretch: symmetric Dirichlet energy, 1 = isometric, each face trimmed at 100, surface and uv scaled
 to equal total area.  seam: length of interior edges whose uv differ / √area.
 objective: Σ area · (stretch − 1) + 0.003 · seam, areas as shares of the whole.
+area: of the written surface over that of the SOURCE as trimesh reads it; none where it can't, or SOURCE is `none`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 from flexpara.runtime.errors import FlexparaError, InputError
 from flexpara.runtime.geometry.metrics import face_distortion, measure, uv_charts
 from flexpara.runtime.geometry.topology import components
+from flexpara.runtime.geometry.triangles import triangle_areas
 from flexpara.runtime.mesh import Surface
 
 if TYPE_CHECKING:
@@ -44,28 +46,47 @@ def read_layout(path: Path) -> tuple[Surface, NDArray[np.float64]]:
     if path.suffix == ".npz":
         with np.load(path, allow_pickle=False) as found:
             return Surface(found["vertices"], found["faces"]), found["corner_uv"]
-    import trimesh
-
-    scene = trimesh.load_scene(path, process=False)
     corners, corner_uv, done = list[Any](), list[Any](), set[str]()
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        if str(name) in done:  # an instance shares the uv of the first
+    for name, mesh, triangles in parts_of(path):
+        if name in done:  # an instance shares the uv of the first
             continue
-        done.add(str(name))
-        mesh = scene.geometry[name]
-        faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3), np.int64)))
-        uv = getattr(getattr(mesh, "visual", None), "uv", None)
-        if len(faces) and uv is None:
+        done.add(name)
+        uv = getattr(mesh.visual, "uv", None)
+        if uv is None:
             raise InputError(f"{path.name}: its part {name!r} has no uv, expected uv on all faces; unwrap it again")
-        if len(faces):
-            xyz = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
-            corners.append(xyz[faces])
-            corner_uv.append(np.asarray(uv, np.float64)[faces])
+        corners.append(triangles)
+        corner_uv.append(np.asarray(uv, np.float64)[mesh.faces])
     if not corners:
         raise InputError(f"{path.name} holds no triangle, expected a mesh; unwrap it again")
     vertices, welded = np.unique(np.concatenate(corners).reshape(-1, 3), axis=0, return_inverse=True)
     return Surface(vertices, welded.reshape(-1, 3).astype(np.int64)), np.concatenate(corner_uv)
+
+
+def parts_of(path: Path) -> list[tuple[str, Any, NDArray[np.float64]]]:
+    """Name, trimesh's mesh and triangles (f, 3, 3) in the scene, of each node of a file that has faces."""
+    import trimesh
+
+    scene = trimesh.load_scene(path, process=False)
+    found = []
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if len(getattr(mesh, "faces", ())):
+            xyz = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+            found.append((str(name), mesh, xyz[np.asarray(mesh.faces)]))
+    return found
+
+
+def area_of(path: str) -> float | None:
+    """Surface area of a file as trimesh reads it; None for "none", and where it reads no area."""
+    if path == "none":
+        return None
+    try:
+        total = sum(float(triangle_areas(triangles).sum()) for _, _, triangles in parts_of(Path(path)))
+    except Exception as error:  # whatever a reader of forty formats may raise: then there is nothing to compare with
+        print(f"{path}: trimesh can't read it: {error!r}", file=sys.stderr)
+        return None
+    return total if 0.0 < total < float("inf") else None
 
 
 def judged(surface: Surface, corner_uv: NDArray[np.float64], evaluate: Evaluator | None = None) -> dict[str, Any]:
@@ -139,12 +160,13 @@ def load_evaluator(path: str) -> Evaluator | None:
     return lambda vertices, faces, uv: module.evaluate(vertices, faces, uv, raster=False)
 
 
-def main(result: str, evaluator: str, *paths: str) -> int:
+def main(result: str, evaluator: str, source: str, *paths: str) -> int:
     """Write {file name: metrics, or {"error": …}} as JSON."""
-    evaluate, found = load_evaluator(evaluator), dict[str, Any]()
+    evaluate, area, found = load_evaluator(evaluator), area_of(source), dict[str, Any]()
     for path in map(Path, paths):
         try:
             found[path.name] = judged(*read_layout(path), evaluate)
+            found[path.name]["area"] = None if area is None else (area_of(str(path)) or 0.0) / area
         except FlexparaError as error:
             found[path.name] = {"error": str(error)}
     Path(result).write_text(json.dumps(found), encoding="utf-8")

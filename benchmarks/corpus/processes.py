@@ -1,4 +1,4 @@
-"""One command in a process group of its own: exit code, wall seconds, peak memory, the last line of stderr.
+"""One command in a process group of its own: exit code, wall and CPU seconds, peak memory, the last line of stderr.
 
 Standard library only: a process begins with the peak memory of the one that started it, so this one stays small.
 Memory is the larger of two: the greatest resident size that one process of the group had (kernel's figure), and the
@@ -18,6 +18,8 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SAMPLE_SECONDS = 0.2
+RUNNING: set[int] = set()
+"""Process groups that were started and have not ended."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +27,13 @@ class Ended:
     """How a command ended.
 
     code: exit code, negative for a signal, None where the time limit ended it.  seconds: wall time.
+    cpu_seconds: of all its processes; unlike the wall time, it hardly depends on what else the machine does.
     peak_mb: see the module.  said: last line of stderr that holds anything.  lines: number of lines on stderr.
     """
 
     code: int | None
     seconds: float
+    cpu_seconds: float
     peak_mb: float
     said: str
     lines: int
@@ -40,6 +44,7 @@ def run(command: list[str], limit: float) -> Ended:
     with tempfile.TemporaryFile() as errors:
         start = perf_counter()
         process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
+        RUNNING.add(process.pid)
         over, late, peak = threading.Event(), threading.Event(), [0.0]
         watcher = threading.Thread(target=_watch, args=(process.pid, start + limit, over, late, peak))
         watcher.start()
@@ -52,12 +57,26 @@ def run(command: list[str], limit: float) -> Ended:
             over.set()
             watcher.join()
         _kill(process.pid)  # what it left behind
+        RUNNING.discard(process.pid)
         seconds = perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
         errors.seek(0)
         said = [line.strip() for line in errors.read().decode(errors="replace").splitlines() if line.strip()]
     code = None if late.is_set() else process.returncode
-    return Ended(code, seconds, max(peak[0], used.ru_maxrss / 1024), said[-1] if said else "", len(said))
+    return Ended(
+        code,
+        seconds,
+        used.ru_utime + used.ru_stime,
+        max(peak[0], used.ru_maxrss / 1024),
+        said[-1] if said else "",
+        len(said),
+    )
+
+
+def end_all() -> None:
+    """Kill every command that is running, with all that it started."""
+    for group in list(RUNNING):
+        _kill(group)
 
 
 def _watch(group: int, deadline: float, over: threading.Event, late: threading.Event, peak: list[float]) -> None:

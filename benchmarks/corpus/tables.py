@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 COLUMNS = {
-    "file": "{}", "tool": "{}", "status": "{}", "seconds": "{:.1f}", "peak_mb": "{:.0f}", "faces": "{}", "parts": "{}",
-    "charts": "{}", "charts_per_part": "{:.2f}", "stretch": "{:.4f}", "stretch_p95": "{:.4f}", "worst_chart": "{:.4f}",
-    "flips": "{}", "degenerate": "{}", "overlap": "{:.1e}", "seam": "{:.2f}", "objective": "{:.4f}",
-    "packing": "{:.3f}", "rms_texels": "{:.2f}", "agreement": "{:.4f}", "said": "{}",
+    "file": "{}", "tool": "{}", "status": "{}", "seconds": "{:.1f}", "cpu_seconds": "{:.1f}", "peak_mb": "{:.0f}",
+    "faces": "{}", "area": "{:.4f}", "parts": "{}", "charts": "{}", "charts_per_part": "{:.2f}", "stretch": "{:.4f}",
+    "stretch_p95": "{:.4f}", "worst_chart": "{:.4f}", "flips": "{}", "degenerate": "{}", "overlap": "{:.1e}",
+    "seam": "{:.2f}", "objective": "{:.4f}", "packing": "{:.3f}", "rms_texels": "{:.2f}", "agreement": "{:.4f}",
+    "said": "{}",
 }  # fmt: skip
 VALID = ("collapsed<=0", "flips<=0", "degenerate<=0", "overlap<=0", "outside<=0")
 """What makes a written layout valid; `outside` is not asked of peers, whose uv are in texels."""

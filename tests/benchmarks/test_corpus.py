@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.corpus import tables
-from benchmarks.corpus.__main__ import main, meshes
+from benchmarks.corpus.__main__ import FILE_BARS, main, meshes
 from benchmarks.corpus.judge import beside, judged, load_evaluator, read_layout, weighted_quantile
+from benchmarks.corpus.judge import main as judge_files
 from benchmarks.corpus.processes import run
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.sessions.session import UnwrapSession
@@ -72,6 +74,23 @@ def test_a_file_without_uv_or_triangles_is_an_error(tmp_path: Path) -> None:
         read_layout(text_file(tmp_path, "bare.obj", SQUARE + "f 1 2 3\n"))
 
 
+def test_a_surface_that_came_back_smaller_is_seen(tmp_path: Path) -> None:
+    source = text_file(tmp_path, "source.obj", SQUARE + "f 1 2 3 4\n")
+    written = text_file(tmp_path, "written.obj", WHOLE.replace("f 1/1 3/3 4/4\n", ""))
+    result = tmp_path / "judged.json"
+    assert judge_files(str(result), "none", str(source), str(written)) == 0
+    assert json.loads(result.read_text(encoding="utf-8"))["written.obj"]["area"] == pytest.approx(0.5)
+    assert judge_files(str(result), "none", str(tmp_path / "absent.obj"), str(written)) == 0
+    assert json.loads(result.read_text(encoding="utf-8"))["written.obj"]["area"] is None
+
+
+def test_the_bars_of_single_files_can_be_read() -> None:
+    bars = json.loads(FILE_BARS.read_text(encoding="utf-8"))
+    for name, texts in bars.items():
+        assert "/" in name
+        assert len(tables.missed(row(), texts)) <= len(texts)
+
+
 def test_the_evaluator_from_outside_is_believed_in_defects_and_disagreement_is_named(tmp_path: Path) -> None:
     layout = read_layout(text_file(tmp_path, "square.obj", WHOLE))
     found = judged(*layout, load_evaluator(str(text_file(tmp_path, "evaluator.py", EVALUATOR))))
@@ -103,7 +122,27 @@ def test_a_process_is_timed_and_ended_at_its_limit() -> None:
     assert (done.code, done.said, done.lines) == (1, "mesh", 2)
     late = run([sys.executable, "-c", "import time; time.sleep(60)"], 0.5)
     assert late.code is None
-    assert 0.5 <= late.seconds < 10.0
+    assert late.seconds >= 0.5
+    busy = run([sys.executable, "-S", "-c", "import time\nwhile time.process_time() < 0.3: pass"], 60.0)
+    assert 0.3 <= busy.cpu_seconds <= busy.seconds + 0.1
+
+
+def test_an_interrupted_run_leaves_no_process_behind(tmp_path: Path) -> None:
+    alive = tmp_path / "alive"
+    child = f"import pathlib, time; time.sleep(3); pathlib.Path({str(alive)!r}).touch()"
+    code = f"""import signal, sys
+from benchmarks.corpus import __main__ as corpus
+signal.signal(signal.SIGTERM, corpus.interrupted)
+print("ready", flush=True)
+corpus.run([sys.executable, "-S", "-c", {child!r}], 60.0)"""
+    with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(0.5)
+        process.terminate()
+        assert process.wait() == 143
+    time.sleep(3.0)
+    assert not alive.exists()
 
 
 def test_peak_memory_is_that_of_all_its_processes() -> None:
