@@ -25,7 +25,8 @@ class Surface:
     """A welded triangle surface: what sampling, training, finishing and metrics work on.
 
     vertices: (v, 3) float64, finite, each used by a face.
-    faces: (f, 3) int64, no degenerate and no duplicate face; consistently oriented where that is possible.
+    faces: (f, 3) int64, no degenerate face; consistently oriented where that is possible.  Faces that lie on each other
+    (second sides, copies) have vertices of their own at the same places.
     """
 
     vertices: NDArray[np.float64]

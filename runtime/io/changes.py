@@ -17,7 +17,6 @@ WORDS = {
     "degenerate_faces": "{} without area left out|face|faces",
     "dropped_face_colors": "colours of {} left out, as the vertices have their own|face|faces",
     "dropped_normals": "normals of {} left out, as other parts have none|vertex|vertices",
-    "duplicate_faces": "{} repeating another left out|face|faces",
     "faces_under_three_corners": "{} of under three corners left out|face|faces",
     "faces_without_colors": "{} without colours made white|face|faces",
     "faces_without_uv": "{} without uv in a mesh that has them|face|faces",

@@ -1,1 +1,1 @@
-"""Triangles as a file holds them → a surface to work on: welded, degenerate faces left out, oriented."""
+"""Triangles as a file holds them → a surface to work on: welded, second sides apart, oriented; `clean` does it all."""

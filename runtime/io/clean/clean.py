@@ -1,4 +1,4 @@
-"""Raw triangles → Asset: weld, leave out what is no triangle, orient.
+"""Raw triangles → Asset: weld, leave out what is no triangle, take second sides apart, orient.
 
 n file vertices · v surface vertices · f faces.  Positions are float64 in source units.  Faces that stay keep their
 order and their first corner; a turned face swaps its corners 1 and 2.  Every change is counted.
@@ -17,6 +17,7 @@ from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
 from ...mesh import Asset, Surface
 from ..rawmesh import RawMesh, check, with_vertices
 from .orient import connected_labels, face_edges, inconsistent_faces
+from .sheets import separate_sheets, twins
 from .weld import degenerate_faces, longest_edges, weld_vertices
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
-    """Weld, leave out degenerate faces and unused vertices, leave out duplicate faces, orient.
+    """Weld, leave out degenerate faces and unused vertices, take faces that lie on each other apart, orient.
 
     Raises: MeshError for a mesh that is empty, not finite, out of range, too large, or degenerate in all its faces.
     """
@@ -39,15 +40,14 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
         )
     kept = np.flatnonzero(proper)
     welded = np.unique(weld[part.faces[kept]], return_inverse=True)[1].reshape(-1, 3)
-    single = np.zeros(len(kept), dtype=np.bool_)
-    single[first_of_each(equal_rows(np.sort(welded, axis=1)))] = True
-    kept, sheets = kept[single], welded[single]
+    lies_on = np.bincount(twins(welded))[twins(welded)] > 1
+    sheets, _ = separate_sheets(welded)
     flip = inconsistent_faces(sheets)
     counts = {
         "unreferenced_vertices": len(raw.positions) - len(np.unique(part.faces[kept])),
         "welded_vertices": len(weld) - len(first_of_each(weld)),
         "degenerate_faces": int(np.count_nonzero(~proper)),
-        "duplicate_faces": int(np.count_nonzero(~single)),
+        "coincident_faces": int(np.count_nonzero(lies_on)),
         "flipped_faces": int(np.count_nonzero(flip)),
     }
     whole = replace(

@@ -69,10 +69,24 @@ def test_a_sliver_is_kept_while_float64_sees_its_area(height: float, dropped: bo
     assert degenerate_faces(corners, np.array([[0, 1, 2]])).tolist() == [dropped]
 
 
-def test_duplicates_in_any_rotation_and_winding_keep_the_first() -> None:
+def test_a_face_on_another_stays_and_is_counted() -> None:
     asset = cleaned(SQUARE, [[1, 2, 0], [0, 1, 2], [0, 2, 3], [3, 2, 0], [2, 1, 0]])
-    assert asset.changes == {"duplicate_faces": 3}
-    np.testing.assert_array_equal(asset.faces, [[1, 2, 0], [0, 2, 3]])
+    assert asset.changes == {"coincident_faces": 5, "components": 3}
+    assert len(asset.faces) == 5
+    np.testing.assert_array_equal(asset.positions[asset.faces], asset.surface.triangles)
+
+
+def test_a_file_vertex_of_two_sheets_is_split_and_takes_its_attributes_along() -> None:
+    colors = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    raw = RawMesh(positions=TRIANGLE, faces=np.array([[0, 1, 2], [0, 2, 1]]), colors=colors, uv=TRIANGLE[:, :2])
+    asset = clean(raw)
+    np.testing.assert_array_equal(asset.positions[:3], TRIANGLE)
+    np.testing.assert_array_equal(asset.positions[asset.faces], TRIANGLE[[[0, 1, 2], [0, 2, 1]]])
+    assert asset.colors is not None
+    assert asset.uv is not None
+    np.testing.assert_array_equal(asset.colors[asset.faces], colors[[[0, 1, 2], [0, 2, 1]]])
+    np.testing.assert_array_equal(asset.uv[asset.faces], TRIANGLE[:, :2][[[0, 1, 2], [0, 2, 1]]])
+    assert len(set(asset.surface.faces.ravel().tolist())) == 6
 
 
 def test_unreferenced_vertices_take_their_attributes_along() -> None:
@@ -178,3 +192,17 @@ def test_what_is_no_surface_is_refused(positions: np.ndarray, faces: list[list[i
     with pytest.raises(MeshError, match=message) as caught:
         cleaned(positions, faces)
     assert "\n" not in str(caught.value)
+
+
+def test_a_part_far_smaller_than_the_scene_keeps_its_vertices_apart() -> None:
+    small = 1e-9 * SQUARE
+    asset = cleaned(np.vstack([small, 1.0 + SQUARE]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    assert asset.changes == {"components": 2}
+    assert len(asset.surface.vertices) == 8
+
+
+def test_broken_normals_are_those_of_the_surface_and_counted() -> None:
+    normals = np.array([[0.0, 0.0, -1.0], [np.nan, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    asset = clean(RawMesh(positions=TRIANGLE, faces=np.array([[0, 1, 2]]), normals=normals))
+    assert asset.changes == {"repaired_normals": 2}
+    np.testing.assert_array_equal(asset.normals, [[0, 0, -1], [0, 0, 1], [0, 0, 1]])

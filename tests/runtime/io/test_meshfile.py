@@ -189,13 +189,13 @@ def test_an_obj_reaches_no_picture_outside_its_folder(tmp_path: Path, name: str)
 def test_arrays_are_cleaned_like_files() -> None:
     asset = asset_from_arrays(
         TRIANGLE.astype(np.float32).tolist(),
-        [[0, 1, 2], [2, 1, 0]],
+        [[0, 1, 2], [2, 1, 2]],
         normals=[[0, 0, 2]] * 3,
         colors=[[1.0, 0.5, 0.0]] * 3,
         uv=TRIANGLE[:, :2],
         stem="thing",
     )
-    assert asset.changes == {"duplicate_faces": 1}
+    assert asset.changes == {"degenerate_faces": 1}
     assert (asset.stem, asset.sha256) == ("thing", "")
     np.testing.assert_array_equal(asset.normals, [[0, 0, 1]] * 3)
     np.testing.assert_array_equal(asset.colors, [[255, 128, 0, 255]] * 3)
