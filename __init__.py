@@ -15,6 +15,8 @@ from .runtime import forks as _forks  # noqa: F401  # it has to be there before 
 from .runtime.errors import FlexparaError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -217,10 +219,16 @@ class UnwrapResult:
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
             return self.write(output, outputs, progress)
 
-    def write(self, output: OutputFolder, outputs: Outputs, progress: Progress | None = None) -> tuple[Path, ...]:
-        """As `save`, into an open OutputFolder."""
+    def write(
+        self,
+        output: OutputFolder,
+        outputs: Outputs,
+        progress: Progress | None = None,
+        note: Callable[[str], None] | None = None,
+    ) -> tuple[Path, ...]:
+        """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import write_outputs
+        from .bake.output import texture_notes, write_outputs
         from .export.assemble import invert
         from .runtime.progress import Clock
 
@@ -239,6 +247,8 @@ class UnwrapResult:
         if self.cloud is not None:
             self._write_points(output, self.cloud)
         report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
+        for fact in texture_notes(report["textures"]) if note is not None else ():
+            note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
         output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()

@@ -120,7 +120,7 @@ def _perform(run: Run, console: Console) -> int:
                 result = unwrap_asset(source, run.options, progress, run.keep)
             else:
                 result = unwrap_cloud(source, run.options, progress, run.keep)
-            written = result.write(folder, run.outputs, progress)
+            written = result.write(folder, run.outputs, progress, console.note)
     if result.cloud is not None:
         console.note_changes(result.asset)
     console.notes(result.report["train"])
@@ -201,7 +201,7 @@ def export(
             from .train.saved import read_trained
         with console.progress() as progress:
             found = assemble(asset, read_trained(trained, asset), Clock(progress), size=options.size, padding=margin)
-            written = UnwrapResult(asset, found).write(folder, outputs, progress)
+            written = UnwrapResult(asset, found).write(folder, outputs, progress, console.note)
     console.show({**found.report["metrics"], **found.report["network"]}, written)
     return 0
 

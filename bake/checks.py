@@ -5,8 +5,11 @@ OpenGL and image libraries are imported when something needs them: an obj file a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
 
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
@@ -44,7 +47,17 @@ def chosen_maps(
     green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
     find = find_map if high is None else high.find_map
     entries = [find(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
-    return [*entries, *(field_map(path) for path in fields)]
+    return [with_background(entry, outputs) for entry in (*entries, *(field_map(path) for path in fields))]
+
+
+def with_background(entry: BakeMap, outputs: Outputs) -> BakeMap:
+    """The map with the background asked for, where it is one of colours; others keep their neutral value."""
+    if outputs.background is None or entry.encoding != "srgb":
+        return entry
+    from .color import linear_from_srgb
+
+    levels = np.array([int(outputs.background[start : start + 2], 16) for start in (1, 3, 5)])
+    return replace(entry, background=tuple(linear_from_srgb(levels / 255.0).tolist()))
 
 
 def check_outputs(

@@ -12,10 +12,10 @@ from .. import __version__
 from ..runtime.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
-from ..runtime.options import AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
+from ..runtime.options import AUTO, AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
 from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
-from .output import bake_textures, bleeding, texture_facts, with_tangents
+from .output import bake_textures, bleeding, gutter_of, texture_facts, texture_notes, with_tangents
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 class BakeOptions(Seeded, AtlasOptions, MapOptions):
     """What is baked onto a mesh that has uv."""
 
-    maps: Names = ("position", "normal")
-    """The maps to bake, by name.  auto stands for normal, position, and what the materials of the source have, or else
-    a checker."""
+    maps: Names = (AUTO,)
+    """The maps to bake, by name.  auto stands for what the source has: colours and the textures of its materials, and
+    the normals of a high-poly mesh."""
     fields: Annotated[Paths, Parameter(name="--field")] = ()
     """An ONNX file from points to channels, which becomes a map; may be given several times."""
     udim: Flag = False
@@ -99,8 +99,11 @@ def bake(
 
     asset = load(mesh)
     console.note_changes(asset)
-    entries = chosen_maps(outputs.for_asset(asset), high=high, fields=options.fields, seed=options.seed)
     atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
+    outputs = outputs.for_asset(asset) if high is None else high.outputs(outputs)
+    entries = chosen_maps(outputs, high=high, fields=options.fields, seed=options.seed)
+    if not entries:
+        raise InputError(f"maps is auto, which finds nothing to bake in {mesh.name}; pass for instance --maps ao")
     atlas = with_tangents(atlas, entries)
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
     facts["settings"] = settings(options, source) | {"maps": [entry.name for entry in entries]}
@@ -113,10 +116,12 @@ def bake(
             else:
                 baked = bake_textures(folder, atlas, asset, outputs, entries, Clock(progress))
                 facts["textures"] = texture_facts(atlas, baked)
-                facts["textures"]["clean_mip"] = bleeding(atlas, options.size, options.margin)
+                facts["textures"]["clean_mip"] = bleeding(atlas, options.size, gutter_of(atlas, outputs))
         facts |= {} if high is None else {"high": high.report()}
         folder.write_report(facts)
         written = folder.commit()
+    for fact in texture_notes(facts.get("textures", {})):
+        console.note(fact)
     console.show({}, written)
     console.show({} if high is None else high.report(), ())
     return 0
@@ -128,7 +133,8 @@ def _bake_squares(
     """Bake and write one image for each map and square of uv; returns the squares' numbers."""
     from .udim import bake_udim, write_udim
 
-    tiles = bake_udim(atlas, asset, list(maps), size=options.size, padding=options.margin, samples=options.samples)
+    gutter = gutter_of(atlas, options.outputs)
+    tiles = bake_udim(atlas, asset, list(maps), size=options.size, padding=gutter, samples=options.samples)
     kind = options.texture_format
     folder.write_several(lambda path: write_udim(tiles, path, asset.stem, file_type=kind))
     return list(tiles)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from ..runtime.extras import requires
 from .checks import exr_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
@@ -79,7 +79,7 @@ def bake_textures(
         atlas,
         asset,
         list(maps),
-        padding=atlas.padding,
+        padding=gutter_of(atlas, outputs),
         samples=outputs.samples,
         scratch=Path(tempfile.gettempdir()) if atlas.size >= LARGE else None,
         progress=lambda name: clock("bake", names.index(name), len(names)),
@@ -87,6 +87,11 @@ def bake_textures(
     clock("bake", len(names), len(names))
     with clock.stage("write textures"):
         return Baked(textures, _write_files(output, textures, asset, outputs))
+
+
+def gutter_of(atlas: Atlas, outputs: Outputs) -> int | None:
+    """Texels filled around charts: None, which is the whole image, unless a background colour was asked for."""
+    return None if outputs.background is None else atlas.padding
 
 
 def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asset, outputs: Outputs) -> dict[str, str]:
@@ -176,15 +181,41 @@ def _write_usda(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
 
 
 def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
-    """What the report says of the textures: their files, and how far the two sides of seams differ in each."""
+    """What the report says of the textures: files, settings, seams, and which maps are the same all over.
+
+    "seam_error" tells how far the two sides of seams differ in each map; "constant" has the value of each map that is
+    one, to half a step of 8 bits of its range.
+    """
     if not baked.textures:
         return {}
+    from .closing import ClosingConfig
     from .seams import seam_report
 
-    return {"files": baked.files, "seam_error": seam_report(atlas, baked.textures)}
+    constant = {name: constant_value(texture) for name, texture in baked.textures.items()}
+    return {
+        "files": baked.files,
+        "settings": {"closing": asdict(ClosingConfig())},
+        "seam_error": seam_report(atlas, baked.textures),
+        "constant": {name: value for name, value in constant.items() if value is not None},
+    }
 
 
-def bleeding(atlas: Atlas, size: int, padding: int) -> int:
+def constant_value(texture: Texture) -> list[float] | None:
+    """The value of a texture that is the same all over, a number a channel; None for any other."""
+    whole = {"[0, 1]": 1.0, "[-1, 1]": 2.0}.get(texture.metadata.get("range", ""), 0.0)
+    low, high = texture.pixels.min(axis=(0, 1)), texture.pixels.max(axis=(0, 1))
+    return low.tolist() if float((high - low).max()) <= whole * 0.5 / 255.0 else None
+
+
+def texture_notes(facts: Mapping[str, Any]) -> list[str]:
+    """What a user should know of the textures: a line for each map that is the same all over."""
+    return [
+        f"the map {name} is the same all over ({', '.join(f'{number:.3g}' for number in value)}); leave it out"
+        for name, value in facts.get("constant", {}).items()
+    ]
+
+
+def bleeding(atlas: Atlas, size: int, padding: int | None) -> int:
     """The highest mip level of such textures at which no chart takes in another's texels."""
     from .baker import chart_labels
     from .seams import clean_mip

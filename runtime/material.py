@@ -83,16 +83,18 @@ def used_materials(asset: Asset) -> list[Material]:
 
 
 def source_maps(asset: Asset) -> tuple[str, ...]:
-    """The maps that together make the output look like the source, beside a normal map; () for a bare surface.
+    """The maps that together make the output look like the source; () for a bare surface.
 
-    base-color where there is colour, orm where both occlusion and a metallic-roughness that varies are there, else the
-    one that is, emissive where something glows.  What is the same all over needs no map: it stays a factor.
+    normal where there is a normal texture (vertex normals are written as they are), base-color where there is colour,
+    orm where both occlusion and a metallic-roughness that varies are there, else the one that is, emissive where
+    something glows.  What is the same all over needs no map: it stays a factor.
     """
     used = used_materials(asset)
     has = {slot: asset.uv is not None and any(slot in entry.pictures for entry in used) for slot in SLOTS}
     finish = has["metallic-roughness"] or len({entry.finish for entry in used}) > 1
     colors = {entry.base_color_factor for entry in used}
-    names = ["base-color"] if has["base-color"] or asset.colors is not None or len(colors) > 1 else []
+    names = ["normal"] if has["normal"] else []
+    names += ["base-color"] if has["base-color"] or asset.colors is not None or len(colors) > 1 else []
     if finish and has["occlusion"]:
         names.append("orm")
     else:

@@ -7,6 +7,7 @@ one field here and its use.  Values are checked when an object is made.  Sizes a
 Annotations are evaluated here, unlike in other modules: cyclopts reads those of fields that other classes inherit.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
@@ -168,8 +169,11 @@ class MapOptions:
     """Which maps are baked, and how they are stored."""
 
     maps: Names = (AUTO,)
-    """The maps to bake, by name (flexpara bake --help lists them).  auto stands for normal, position, and what the
-    materials of the source have, or else a checker; none bakes nothing."""
+    """The maps to bake, by name (flexpara bake --help lists them).  auto stands for what the source has: colours and
+    the textures of its materials; none bakes nothing."""
+    background: str | None = None
+    """Colour of what lies beyond the padding of charts, as #rrggbb; by default the whole image is filled from the
+    nearest chart, so that mip levels take in no background."""
     target: str | None = None
     """The engine that the files are for: gltf, unreal, unity, godot, blender or usd.  It decides about file names,
     packed channels, bit depth, green channel and padding."""
@@ -189,13 +193,18 @@ class MapOptions:
     """Compression of that file, by OpenEXR's name: zip, zips, piz, rle, none, …"""
 
     def __post_init__(self) -> None:
-        kind, green = self.texture_format, self.normal_format
+        kind, green, color = self.texture_format, self.normal_format, self.background
         demand(kind in (None, "png", "exr"), f"texture format is {kind!r}, expected png or exr; choose one of them")
         demand(green in ("opengl", "directx"), f"normal format is {green!r}, expected opengl or directx; choose one")
         demand(self.samples in (1, 4, 16), f"samples is {self.samples}, expected 1, 4 or 16; choose one of them")
         demand(1 <= self.rays <= 4096, f"rays is {self.rays}, expected 1 to 4096; pass for instance --rays 64")
         plain = (self.exr_bits, self.exr_compression) == (MapOptions.exr_bits, MapOptions.exr_compression)
         demand(self.layers or plain, "exr-bits or exr-compression without layers, expected both; add --layers")
+        hexadecimal = color is None or re.fullmatch("#[0-9a-fA-F]{6}", color) is not None
+        demand(
+            hexadecimal,
+            f"background is {color!r}, expected a colour as #rrggbb; pass --background #000000",
+        )
         both = self.layers and self.target is not None
         demand(not both, f"layers with target {self.target}, expected one of the two; leave the other out")
 
@@ -235,7 +244,7 @@ class Outputs(FileOptions, MapOptions):
         """The same for one mesh: "auto" replaced by the maps it stands for, each map once, and preview decided."""
         from .material import source_maps
 
-        auto = ("normal", "position", *(source_maps(asset) or ("uv-checker",)))
+        auto = source_maps(asset)
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
         drawn = bool(self.maps) if self.preview is None else self.preview
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)

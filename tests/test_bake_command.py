@@ -7,6 +7,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from flexpara.__main__ import main
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 pytest.importorskip("moderngl")
+
+from flexpara.bake.files.images import read_image
+
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 
 
@@ -106,3 +110,34 @@ def test_a_file_that_finds_no_room_ends_with_2_and_leaves_nothing(words: list[st
     assert "expected" in done.stderr
     assert done.stderr.startswith("flexpara: error: square")
     assert not (square.parent / "out").exists()
+
+
+def test_the_whole_image_is_filled_unless_a_background_is_asked_for(square: Path) -> None:
+    small = SQUARE.replace("vt 1 0", "vt .5 0").replace("vt 1 1", "vt .5 .5").replace("vt 0 1", "vt 0 .5")
+    square.write_text(small, encoding="utf-8")
+    _, report = baked(square, "--maps", "uv-checker,chart")
+    whole = read_image(square.parent / "out" / "square_chart.png")
+    assert (whole == whole[-1, 0]).all()
+    assert report["textures"]["clean_mip"] == 5  # of 32 texels: the full chain
+    assert list(report["textures"]["constant"]) == ["chart"]
+    _, report = baked(square, "--maps", "chart,ao", "--rays", "4", "--background", "#ff8000")
+    chart, ao = (read_image(square.parent / "out" / f"square_{name}.png") for name in ("chart", "ao"))
+    np.testing.assert_array_equal(chart[0, -1], [255, 128, 0])
+    assert ao[0, -1] == 255
+    assert report["textures"]["clean_mip"] < 5
+    assert report["settings"]["background"] == "#ff8000"
+
+
+def test_auto_bakes_what_there_is(square: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bake", str(square), "-o", str(square.parent / "out"), "--size", "32"]) == 2
+    assert "maps is auto, which finds nothing to bake in square.obj; pass for instance" in capsys.readouterr().err
+    high = square.with_name("high.obj")
+    high.write_text("v -1 -1 .01\nv 2 -1 .01\nv 2 2 .02\nv -1 2 .01\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    files, _ = baked(square, "--high", str(high), "--cage", "0.05")
+    assert files == {"square_normal.png"}
+
+
+def test_maps_that_are_the_same_all_over_are_said_to_be_so(square: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = square.parent / "out"
+    assert main(["bake", str(square), "-o", str(out), "--size", "32", "--maps", "normal,position"]) == 0
+    assert capsys.readouterr().err == "flexpara: note: the map normal is the same all over (0, 0, 1); leave it out\n"

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.material import source_maps
+from ...runtime.options import AUTO
 from ..bakemap import BakeMap
 from ..maps.catalogue import HEIGHT, find_map
 from ..maps.normals import in_tangent_space, object_normal_map
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from ...runtime.options import Outputs
     from ..bakemap import Compute, NormalFormat
     from ..maps.rays import Progress
     from ..raster.gbuffer import GBuffer
@@ -56,6 +59,12 @@ class HighSource:
     def surface(self, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> HighSurface:
         """The high-poly surface under a G-buffer of the low-poly atlas.  Raises as `bake_from_high`."""
         return self._found(gbuffer, atlas, asset)
+
+    def outputs(self, outputs: Outputs) -> Outputs:
+        """The same with "auto" replaced by the maps that the high-poly meshes have, their normals first."""
+        auto = ("normal", *(name for high in self._highs for name in source_maps(high)))
+        maps = [name for entry in outputs.maps for name in (auto if entry == AUTO else (entry,))]
+        return replace(outputs, maps=tuple(dict.fromkeys(maps)))
 
     def find_map(
         self, name: str, *, normal_format: NormalFormat = "opengl", rays: RaySettings | None = None

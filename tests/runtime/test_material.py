@@ -20,7 +20,7 @@ def asset_with(*materials: Material, uv: bool = True) -> Any:
 def test_the_source_s_maps_are_those_that_vary() -> None:
     picture = Picture(np.zeros((1, 1, 4), np.uint8))
     full = Material(pictures=dict.fromkeys(SLOTS, picture))
-    assert source_maps(asset_with(full)) == ("base-color", "orm", "emissive")
+    assert source_maps(asset_with(full)) == ("normal", "base-color", "orm", "emissive")
     assert source_maps(asset_with(full, uv=False)) == ()
     assert source_maps(asset_with(Material())) == ()
     assert source_maps(asset_with(Material(metallic=1.0), Material())) == ("metallic-roughness",)

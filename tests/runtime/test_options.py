@@ -77,17 +77,17 @@ def test_layers_do_not_fit_what_names_one_file_a_map(wrong: dict[str, Any]) -> N
     Outputs(layers=True)
 
 
-def test_auto_shows_the_colours_of_the_source_or_else_a_checker() -> None:
+def test_auto_stands_for_what_the_source_has() -> None:
     picture = Material(pictures={"base-color": Picture(np.zeros((1, 1, 4), np.uint8))})
-    assert Outputs().for_asset(asset()).maps == ("normal", "position", "uv-checker")
-    assert Outputs().for_asset(asset(materials=(Material(),))).maps[-1] == "uv-checker"
-    assert Outputs().for_asset(asset(materials=(picture,), uv=np.zeros((3, 2)))).maps[-1] == "base-color"
-    assert Outputs().for_asset(asset(colors=np.zeros((3, 4), np.uint8))).maps[-1] == "base-color"
+    assert Outputs().for_asset(asset()).maps == ()
+    assert Outputs().for_asset(asset(materials=(Material(),))).maps == ()
+    assert Outputs().for_asset(asset(materials=(picture,), uv=np.zeros((3, 2)))).maps == ("base-color",)
+    assert Outputs().for_asset(asset(colors=np.zeros((3, 4), np.uint8))).maps == ("base-color",)
 
 
 def test_maps_are_kept_in_order_and_once() -> None:
-    outputs = Outputs(maps=("chart", "auto", "normal")).for_asset(asset())
-    assert outputs.maps == ("chart", "normal", "position", "uv-checker")
+    outputs = Outputs(maps=("chart", "auto", "normal", "chart")).for_asset(asset(colors=np.zeros((3, 4), np.uint8)))
+    assert outputs.maps == ("chart", "base-color", "normal")
     assert Outputs(maps=()).for_asset(asset()).maps == ()
 
 
@@ -137,3 +137,10 @@ def test_a_keyword_of_another_type_is_refused(wrong: dict[str, Any]) -> None:
 def test_an_integer_of_numpy_is_an_integer() -> None:
     charts = from_keywords(Options, None, {"charts": np.int64(5)}).charts
     assert (charts, type(charts)) == (5, int)
+
+
+@pytest.mark.parametrize("color", ["black", "#fff", "#12345g", "000000"])
+def test_a_background_is_six_hexadecimal_digits(color: str) -> None:
+    with pytest.raises(InputError, match=r"background is .*, expected a colour as #rrggbb; pass --background"):
+        Outputs(background=color)
+    assert Outputs(background="#12aBcd").background == "#12aBcd"
