@@ -247,8 +247,9 @@ class UnwrapResult:
         if self.cloud is not None:
             self._write_points(output, self.cloud)
         report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
-        for fact in texture_notes(report["textures"]) if note is not None else ():
-            note(fact)
+        if note is not None:
+            for fact in texture_notes(report["textures"]):
+                note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
         output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()

@@ -13,8 +13,8 @@ import numpy as np
 
 from flexpara.bake.color import chart_colors, linear_from_srgb
 from flexpara.bake.files.images import write_png
+from flexpara.bake.lettering import text_cover, with_text
 from flexpara.bake.pictures.canvas import Camera, Lines, draw, three_quarter_axes
-from flexpara.bake.pictures.lettering import text_cover, with_text
 from flexpara.bake.pictures.preview import INK, PAPER, checker_cells, layout, shading_normals, solid
 from flexpara.bake.raster.context import open_context
 from flexpara.bake.seams import seam_edges

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..color import linear_from_oklab
-from .glyphs import COLUMNS, ROWS, text_mask
+from ..lettering import text_cover
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from ..raster.gbuffer import GBuffer
 
 CELLS = 16
-DOTS = 32
+DOTS = 64
 """Dots per cell side of the drawing of labels."""
+LABEL, LABEL_ROW, ARROW_ROW = 22.0, 16, 45
+"""Height of the font, and rows of a cell in whose middle the label and the arrow stand, in dots."""
 FINE = 4
 
 
@@ -68,13 +70,21 @@ def _palette() -> NDArray[np.float32]:
 def _ink() -> NDArray[np.bool_]:
     """(16 · DOTS, 16 · DOTS) bool, row 0 = top: the label and the arrow of every cell."""
     ink = np.zeros((CELLS * DOTS, CELLS * DOTS), np.bool_)
-    arrow = text_mask("↑", scale=1)
     for row in range(CELLS):
         for column in range(CELLS):
-            label = text_mask(f"{chr(ord('A') + row)}{column + 1}")
-            top, left = (CELLS - 1 - row) * DOTS, column * DOTS
-            label_top, label_left = top + DOTS - ROWS - 5, left + (DOTS - label.shape[1]) // 2
-            ink[label_top : label_top + ROWS, label_left : label_left + label.shape[1]] = label
-            arrow_left = left + (DOTS - COLUMNS) // 2
-            ink[top + 6 : top + 6 + ROWS, arrow_left : arrow_left + COLUMNS] = arrow
+            cell = ink[(CELLS - 1 - row) * DOTS : (CELLS - row) * DOTS, column * DOTS : (column + 1) * DOTS]
+            _stamp(cell, text_cover(f"{chr(ord('A') + row)}{column + 1}", LABEL) > 0.5, LABEL_ROW)
+            _stamp(cell, _arrow(), ARROW_ROW)
     return ink
+
+
+def _stamp(cell: NDArray[np.bool_], mask: NDArray[np.bool_], row: int) -> None:
+    """Set a mask into a cell, in place: its middle in that row and the cell's middle column."""
+    top, left = row - mask.shape[0] // 2, (cell.shape[1] - mask.shape[1]) // 2
+    cell[top : top + mask.shape[0], left : left + mask.shape[1]] |= mask
+
+
+def _arrow() -> NDArray[np.bool_]:
+    """(22, 15) bool: an arrow that points up, along v: a head of 45°, a shaft three dots wide."""
+    row, column = np.mgrid[:22, -7:8]
+    return (np.abs(column) <= row) & ((np.abs(column) <= 1) | (row <= 7) & (np.abs(column) >= row - 2))

@@ -17,11 +17,11 @@ from ...runtime.sessions.wrapagreement import corner_normals
 from ..color import chart_colors
 from ..files.images import write_png
 from ..heat import distortion_scale, face_areas, heat_colors, signed_distortion
+from ..lettering import with_text
 from ..raster.context import open_context
 from ..seams import chart_outlines, seam_edges
 from ..texture import Texture
 from .canvas import Camera, Lines, Shape, draw, three_quarter_axes
-from .lettering import with_text
 
 if TYPE_CHECKING:
     from pathlib import Path

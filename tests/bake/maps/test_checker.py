@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexpara.bake.maps.checker import CELLS, uv_card
-from flexpara.bake.maps.glyphs import FONT, glyph, text_mask
+from flexpara.bake.lettering import text_cover
+from flexpara.bake.maps.checker import ARROW_ROW, CELLS, DOTS, LABEL, LABEL_ROW, uv_card
 
 
 def test_no_flip_or_turn_maps_the_card_onto_itself() -> None:
@@ -22,13 +22,14 @@ def test_all_cells_differ() -> None:
     assert len(np.unique(blocks, axis=0)) == CELLS * CELLS
 
 
-def test_the_first_label_stands_at_the_uv_origin() -> None:
-    side = 512 // CELLS
-    cell = uv_card(512)[-side:, :side].mean(axis=-1)
-    label = text_mask("A1")
-    ink = cell > 0.6
-    rows, columns = np.flatnonzero(ink[20:].any(axis=1)) + 20, np.flatnonzero(ink[20:].any(axis=0))
-    np.testing.assert_array_equal(ink[rows[0] : rows[0] + 7, columns[0] : columns[0] + label.shape[1]], label)
+def test_the_first_label_stands_at_the_uv_origin_and_arrows_point_up() -> None:
+    cell = uv_card(CELLS * DOTS)[-DOTS:, :DOTS].mean(axis=-1) > 0.6  # white ink on the darkest cell
+    label = text_cover("A1", LABEL) > 0.5
+    top, left = LABEL_ROW - label.shape[0] // 2, (DOTS - label.shape[1]) // 2
+    np.testing.assert_array_equal(cell[top : top + label.shape[0], left : left + label.shape[1]], label)
+    arrow = cell[ARROW_ROW - 11 : ARROW_ROW + 11, DOTS // 2 - 8 : DOTS // 2 + 8]
+    assert arrow[:8].any(axis=0).sum() > 3 * arrow[12:].any(axis=0).sum()  # the head is above the shaft
+    assert cell.sum() == label.sum() + arrow.sum()
 
 
 def test_values_are_linear_light_of_any_size() -> None:
@@ -37,16 +38,3 @@ def test_values_are_linear_light_of_any_size() -> None:
         assert card.shape == (size, size, 3)
         assert card.min() >= 0.0
         assert card.max() <= 1.0
-
-
-def test_every_glyph_is_7_by_5_and_unlike_the_others() -> None:
-    drawn = {glyph(character).tobytes() for character in FONT}
-    assert {glyph(character).shape for character in FONT} == {(7, 5)}
-    assert len(drawn) == len(FONT)
-
-
-def test_text_is_laid_out_in_a_row() -> None:
-    mask = text_mask("ab", scale=2)
-    assert mask.shape == (14, 22)
-    np.testing.assert_array_equal(mask[::2, :10:2], glyph("A"))
-    np.testing.assert_array_equal(text_mask("é")[:, :5], glyph(" "))
