@@ -1,7 +1,7 @@
 """From a learned global map to valid charts, one per connected component.   f faces · v vertices · unit ball.
 
 Valid means: no flipped triangle, no overlap, by exact tests.  Each component is opened along its learned seam, slit
-where a disk cannot carry it without stretch (slits lie inside the chart, and are found on a simplified twin), and
+where a disk cannot carry it without stretch (slits lie inside the chart, and are found on a proxy), and
 flattened: from the network's own uv where those are valid once the band is laid out anew, or from the circle.
 Conformal energy spreads that out, SLIM lowers the symmetric Dirichlet energy, contacts hold apart what would overlap,
 and a few last steps of conformal energy trade a little area for angles, which is what the paper's losses ask for.
@@ -52,7 +52,7 @@ class GlobalFinishConfig:
     """From the band to seam edges."""
     finish: FinishConfig = field(default_factory=FinishConfig)
     """Flattening and relief, as for charts."""
-    twin_faces: int = 5000
+    proxy_faces: int = 5000
     """Faces of the simplified disk on which slits are tried."""
     slits: int = 24
     """Slits a component may get: one chart has to do what eight do elsewhere."""
@@ -158,16 +158,16 @@ def open_along_seam(
 
 
 def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> tuple[Slit, ...]:
-    """The slits that pay, by the disk's simplified twin; none where the twin has no valid start."""
+    """The slits that pay, by the disk's proxy; none where the proxy has no valid start."""
     if config.slits == 0:
         return ()
-    twin = simplified(disk, config.twin_faces)
-    loops = boundary_loops(twin.faces)
-    start = circle_start(twin) if len(loops) == 1 else None
+    proxy = simplified(disk, config.proxy_faces)
+    loops = boundary_loops(proxy.faces)
+    start = circle_start(proxy) if len(loops) == 1 else None
     if start is None:
         return ()
     relief = replace(config.finish.relief, most=config.slits, failures=config.failures)
-    flat = Flat(twin, *lowest(twin, {"circle": start}, config)[1])
+    flat = Flat(proxy, *lowest(proxy, {"circle": start}, config)[1])
     return relieve(flat, total_area, relief)[1]
 
 
