@@ -37,6 +37,7 @@ WORDS = {
     "skipped_skins": "{} left out: the mesh stands as it was modelled|skin|skins",
     "textures_of_other_uv": "{} on a second uv set left out|texture|textures",
     "trailing_bytes": "{} behind the last triangle left out|byte|bytes",
+    "uv_not_finite": "uv of {} not finite, set to 0|vertex|vertices",
     "vertices_without_colors": "{} without colours made white|vertex|vertices",
     "vertices_without_z": "{} of two numbers placed at z = 0|vertex|vertices",
 }

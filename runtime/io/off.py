@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import MeshError
 from .colors import as_rgba
 from .polygons import triangulate
-from .rawmesh import RawMesh, split_at_corners
+from .rawmesh import RawMesh, split_at_corners, to_float64
 from .text import is_number, lines_of, shown
 
 if TYPE_CHECKING:
@@ -252,7 +252,7 @@ def _binary_as(
     if len(whole) < 3 or len(data) % 4 or min(whole[:2]) < 0 or 3 + whole[0] * width + whole[1] > len(whole):
         return None
     place = 3 + int(whole[0]) * width
-    table = np.frombuffer(data, dtype=f"{order}f4", count=place - 3, offset=12).reshape(-1, width).astype(np.float64)
+    table = np.frombuffer(data, dtype=f"{order}f4", count=place - 3, offset=12).reshape(-1, width)
     corners, size = [], []
     for _ in range(int(whole[1])):
         if place >= len(whole) or not 0 <= whole[place] <= len(whole) - place - 1 - colored:
@@ -265,4 +265,4 @@ def _binary_as(
             place += 1 + max(int(whole[place]), 0)
     if place != len(whole):
         return None
-    return table, np.concatenate([np.zeros(0, dtype=np.int64), *corners]), np.array(size, dtype=np.int64)
+    return to_float64(table), np.concatenate([np.zeros(0, dtype=np.int64), *corners]), np.array(size, dtype=np.int64)

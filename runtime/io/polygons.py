@@ -78,7 +78,7 @@ def _turned_fans(
         np.add.at(normal, polygon[chosen], cross)
         along = np.einsum("ij,ij->i", cross, normal[polygon[chosen]])
         whole = np.einsum("ij,ij->i", normal, normal)[polygon[chosen]]
-        bad[polygon[chosen[along <= FLAT * whole]]] = True
+        bad[polygon[chosen[np.isfinite(whole) & np.isfinite(along) & (along <= FLAT * whole)]]] = True
     return bad
 
 

@@ -6,7 +6,7 @@ n file vertices · f faces.  Positions are float64 in source units, uv is v up, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -182,6 +182,12 @@ def _joined_materials(
     if any(part.face_material is None for part in parts):
         materials.append(Material(name="default"))
     return tuple(materials), np.concatenate(columns)
+
+
+def to_float64(values: NDArray[Any]) -> NDArray[np.float64]:
+    """The numbers as float64, without a warning about NaN that signal: those are refused where they count."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 def unit_vectors(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from ..errors import MeshError
-from .rawmesh import RawMesh
+from .rawmesh import RawMesh, to_float64
 from .text import decode, number_table
 
 HEADER, RECORD = 84, 50
@@ -51,7 +51,7 @@ def _binary(data: bytes, count: int) -> RawMesh:
     if count == 0:
         raise MeshError("the STL file holds 0 triangles; check the export")
     facets = np.frombuffer(data, dtype=_FACET, count=count, offset=HEADER)
-    return _soup(facets["corner"].reshape(-1, 3).astype(np.float64), len(data) - HEADER - RECORD * count)
+    return _soup(to_float64(facets["corner"].reshape(-1, 3)), len(data) - HEADER - RECORD * count)
 
 
 def _ascii(data: bytes) -> RawMesh:

@@ -81,7 +81,8 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
     weld = by_first_appearance(sheets.ravel()[first][order])
     surface = Surface(vertices=part.positions[first_of_each(weld)], faces=weld[part.faces])
     normals, repaired = _repaired_normals(part.normals, surface, weld)
-    counts = {**raw.changes, "repaired_normals": repaired, **_edge_counts(surface.faces)}
+    uv, moved = _finite_uv(part.uv)
+    counts = {**raw.changes, "repaired_normals": repaired, "uv_not_finite": moved, **_edge_counts(surface.faces)}
     return Asset(
         positions=part.positions,
         faces=part.faces,
@@ -89,7 +90,7 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         surface=surface,
         normals=normals,
         colors=part.colors,
-        uv=part.uv,
+        uv=uv,
         materials=part.materials,
         face_material=part.face_material,
         changes={name: count for name, count in counts.items() if count},
@@ -108,6 +109,14 @@ def _repaired_normals(
     if not broken.any():
         return normals, 0
     return np.where(broken[:, None], smooth_normals(surface)[weld], normals), int(np.count_nonzero(broken))
+
+
+def _finite_uv(uv: NDArray[np.float64] | None) -> tuple[NDArray[np.float64] | None, int]:
+    """The uv, (0, 0) where they are not finite, and how many these were."""
+    if uv is None or np.isfinite(uv).all():
+        return uv, 0
+    broken = np.logical_not(np.isfinite(uv).all(axis=1))
+    return np.where(broken[:, None], 0.0, uv), int(np.count_nonzero(broken))
 
 
 def _edge_counts(faces: NDArray[np.int64]) -> dict[str, int]:

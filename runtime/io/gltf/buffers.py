@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import MeshError
 from ..pictures import inside
-from ..rawmesh import MAX_FACES
+from ..rawmesh import MAX_FACES, to_float64
 from .compression import DRACO, MESHOPT, decode_view, meshopt_of
 
 if TYPE_CHECKING:
@@ -170,4 +170,4 @@ def as_stored(file: GltfFile, index: int, values: NDArray[Any]) -> NDArray[Any]:
     """Numbers of an accessor as it means them: float64 where they are real or normalized, else as they are."""
     if file.tree["accessors"][index].get("normalized") and values.dtype.kind in "iu":
         return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
-    return values.astype(np.float64) if values.dtype.kind == "f" else values
+    return to_float64(values) if values.dtype.kind == "f" else values

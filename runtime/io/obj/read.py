@@ -70,7 +70,7 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
     _check_positions(positions, lines, polygons)
     triangles, polygon = triangulate(positions, polygons.corners[:, 0], polygons.size)
     corners = polygons.corners
-    file_uv, _ = number_table(lines.text["vt"], lines.number["vt"], 1, 2)
+    file_uv, uv_width = number_table(lines.text["vt"], lines.number["vt"], 1, 2)
     file_normals, _ = number_table(lines.text["vn"], lines.number["vn"], 3, 3)
     vertex, faces = _split_vertices(corners, triangles)
     materials, face_material = _materials(lines, polygons.number[polygon], read_sibling, changes)
@@ -82,7 +82,7 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         faces=faces,
         normals=file_normals[vertex[:, 2]] if has_normals else None,
         colors=None if colors is None else colors[vertex[:, 0]],
-        uv=_uv(file_uv, vertex[:, 1]) if has_uv else None,
+        uv=_uv(file_uv, uv_width, vertex[:, 1]) if has_uv else None,
         materials=materials,
         face_material=face_material,
         changes=changes,
@@ -216,11 +216,13 @@ def _split_vertices(
     return corners[order][new], vertex[triangles]
 
 
-def _uv(file_uv: NDArray[np.float64], index: NDArray[np.int64]) -> NDArray[np.float64]:
+def _uv(file_uv: NDArray[np.float64], width: NDArray[np.int64], index: NDArray[np.int64]) -> NDArray[np.float64]:
     """(n, 2) float64; a corner without uv gets (0, 0), a one-dimensional coordinate v = 0."""
     table = np.zeros((len(file_uv) + 1, 2))
     columns = file_uv.shape[1]
-    table[:-1, :columns] = np.nan_to_num(file_uv, posinf=0.0, neginf=0.0)
+    table[:-1, :columns] = file_uv
+    if columns == 2:
+        table[:-1, 1][width < 2] = 0.0
     return table[index]
 
 

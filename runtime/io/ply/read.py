@@ -17,7 +17,7 @@ from ...material import Material, Picture, seen_through
 from ..colors import as_rgba
 from ..pictures import decode_image
 from ..polygons import strip_triangles, triangulate
-from ..rawmesh import RawMesh, split_at_corners
+from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body
 from .header import FACES, ply_header
 
@@ -95,7 +95,7 @@ def _group(table: Table, names: tuple[str, ...]) -> NDArray[np.float64] | None:
     columns = [table.get(name) for name in names]
     if any(column is None or isinstance(column, Lists) for column in columns):
         return None
-    return np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=1)
+    return np.stack([to_float64(np.asarray(column)) for column in columns], axis=1)
 
 
 def _colors(table: Table) -> NDArray[np.uint8] | None:
@@ -105,7 +105,7 @@ def _colors(table: Table) -> NDArray[np.uint8] | None:
         if len(columns) >= 3 and not any(isinstance(column, Lists) for column in columns):
             kinds = {np.asarray(column).dtype for column in columns}
             scale = 65535.0 if kinds == {np.dtype("u2")} else 1.0 if {kind.kind for kind in kinds} == {"f"} else 255.0
-            stacked = np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=1) / scale
+            stacked = np.stack([to_float64(np.asarray(column)) for column in columns], axis=1) / scale
             return as_rgba(stacked)
     return None
 
@@ -161,7 +161,7 @@ def _with_faces(raw: RawMesh, table: Table, header: PlyHeader, read_sibling: Cal
         changes["dropped_face_colors"], face_colors = len(part.faces), None
     if isinstance(face_uv, Lists) and face_uv.size.any():
         if (face_uv.size == 2 * size).all():
-            at_corner = face_uv.values.astype(np.float64).reshape(-1, 2)[inside][triangles]
+            at_corner = to_float64(face_uv.values).reshape(-1, 2)[inside][triangles]
             part = split_at_corners(part, uv=at_corner)
         else:
             changes["faces_without_uv"] = len(part.faces)

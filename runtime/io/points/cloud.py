@@ -16,7 +16,7 @@ from ...errors import InputError, ShapeError
 from ...geometry.rows import first_of_each
 from ..clean.weld import SMALLEST_DIAGONAL, weld_vertices
 from ..colors import as_rgba
-from ..rawmesh import LARGEST_DIAGONAL, unit_vectors
+from ..rawmesh import LARGEST_DIAGONAL, to_float64, unit_vectors
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -92,10 +92,10 @@ def cloud_from_arrays(
         ShapeError: an array of another shape or kind.
         InputError: too few points, NaN or infinite coordinates, or a size that float64 areas can't hold.
     """
-    position = _columns("points", points, (3,), None).astype(np.float64)
+    position = to_float64(_columns("points", points, (3,), None))
     _check_positions(position)
     count = len(position)
-    normal = None if normals is None else unit_vectors(_columns("normals", normals, (3,), count).astype(np.float64))
+    normal = None if normals is None else unit_vectors(to_float64(_columns("normals", normals, (3,), count)))
     color = None if colors is None else as_rgba(_columns("colors", colors, (3, 4), count))
     changes: dict[str, int] = {}
     if normal is not None:

@@ -55,15 +55,15 @@ def read_npy(data: bytes) -> NDArray[Any]:
         shape, by_columns, kind = read(file)
     except Exception as error:  # the header is Python text: whatever its parser raises, the file is damaged
         raise InputError("no .npy file of plain numbers: its header is damaged; write it with numpy.save") from error
-    if kind.hasobject:
-        raise InputError("the array holds Python objects, expected plain numbers; write it with numpy.save")
+    if kind.hasobject or kind.itemsize == 0:
+        raise InputError("the array holds no numbers, expected plain numbers; write it with numpy.save")
     count = int(np.prod(np.array(shape, dtype=object))) if shape else 1
     if min((count, *shape)) < 0 or kind.itemsize * count > len(data) - file.tell():
         raise InputError(
             f"the header promises an array of shape {shape}, the file has {len(data)} bytes; it is cut off or damaged: "
             "copy it again"
         )
-    flat = np.frombuffer(data, dtype=kind, count=count, offset=file.tell()) if kind.itemsize else np.zeros(0)
+    flat = np.frombuffer(data, dtype=kind, count=count, offset=file.tell())
     return flat.reshape(shape, order="F" if by_columns else "C")
 
 

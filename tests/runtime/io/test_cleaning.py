@@ -206,3 +206,10 @@ def test_broken_normals_are_those_of_the_surface_and_counted() -> None:
     asset = clean(RawMesh(positions=TRIANGLE, faces=np.array([[0, 1, 2]]), normals=normals))
     assert asset.changes == {"repaired_normals": 2}
     np.testing.assert_array_equal(asset.normals, [[0, 0, -1], [0, 0, 1], [0, 0, 1]])
+
+
+def test_uv_that_are_not_finite_become_0_and_are_counted() -> None:
+    uv = np.array([[0.5, 0.5], [np.nan, 1.0], [0.0, np.inf]])
+    asset = clean(RawMesh(positions=TRIANGLE, faces=np.array([[0, 1, 2]]), uv=uv))
+    assert asset.changes == {"uv_not_finite": 2}
+    np.testing.assert_array_equal(asset.uv, [[0.5, 0.5], [0, 0], [0, 0]])

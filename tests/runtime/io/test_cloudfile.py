@@ -144,3 +144,28 @@ def test_a_header_that_promises_more_than_the_file_holds_is_refused(tmp_path: Pa
     for name in ("a.npy", "a.npz"):
         with pytest.raises(InputError, match="header promises"):
             load_cloud(tmp_path / name)
+
+
+@pytest.mark.parametrize("kind", ["npy", "npz", "xyz", "ply"])
+def test_no_damaged_byte_gets_past_the_errors(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    if kind == "npy":
+        np.save(path, POINTS)
+    elif kind == "npz":
+        np.savez_compressed(path, points=POINTS, normals=POINTS)
+    elif kind == "xyz":
+        np.savetxt(path, POINTS)
+    else:
+        trimesh.PointCloud(POINTS).export(path)
+    whole = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(200):
+        damaged = whole[: rng.integers(len(whole) // 2, len(whole) + 1)].copy()
+        damaged[rng.integers(0, len(damaged), 3)] = rng.integers(0, 256, 3)
+        path.write_bytes(damaged.tobytes())
+        try:
+            assert np.isfinite(load_cloud(path).points).all()
+        except InputError:
+            refused += 1
+    assert refused > 20

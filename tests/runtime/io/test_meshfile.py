@@ -230,7 +230,7 @@ def test_arrays_of_another_shape_are_refused(arguments: dict[str, np.ndarray], m
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["stl", "ply", "off"])
+@pytest.mark.parametrize("kind", ["stl", "ply", "off", "obj"])
 def test_no_damaged_byte_gets_past_the_errors(tmp_path: Path, kind: str) -> None:
     vertices, faces = make_sample("torus", resolution=6)
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / f"a.{kind}")

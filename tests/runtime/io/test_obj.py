@@ -202,3 +202,9 @@ def test_every_encoding_and_line_end_reads_alike(encoding: str, end: str) -> Non
     raw = read_obj(text.encode(encoding), nothing)
     np.testing.assert_array_equal(raw.positions[raw.faces], [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     assert raw.materials[0].name == "Stück"
+
+
+def test_uv_of_one_number_have_v_0() -> None:
+    raw = read(f"{SQUARE}vt 0.25\nvt 0.5 0.75\nf 1/1 2/2 3/2\n")
+    assert raw.uv is not None
+    np.testing.assert_array_equal(raw.uv[raw.faces[0]], [[0.25, 0], [0.5, 0.75], [0.5, 0.75]])
