@@ -228,7 +228,7 @@ class UnwrapResult:
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import texture_notes, write_outputs
+        from .bake.output import texture_notes, write_outputs, written_notes
         from .export.assemble import invert
         from .runtime.progress import Clock
 
@@ -248,7 +248,7 @@ class UnwrapResult:
             self._write_points(output, self.cloud)
         report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
         if note is not None:
-            for fact in texture_notes(report["textures"]):
+            for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
         output.write_report({**report, "seconds": {**report["seconds"], **seconds}})

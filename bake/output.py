@@ -188,13 +188,13 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
     """
     if not baked.textures:
         return {}
-    from .closing import ClosingConfig
+    from .config import BakeConfig
     from .seams import seam_report
 
     constant = {name: constant_value(texture) for name, texture in baked.textures.items()}
     return {
         "files": baked.files,
-        "settings": {"closing": asdict(ClosingConfig())},
+        "settings": asdict(BakeConfig()),
         "seam_error": seam_report(atlas, baked.textures),
         "constant": {name: value for name, value in constant.items() if value is not None},
     }
@@ -205,6 +205,15 @@ def constant_value(texture: Texture) -> list[float] | None:
     whole = {"[0, 1]": 1.0, "[-1, 1]": 2.0}.get(texture.metadata.get("range", ""), 0.0)
     low, high = texture.pixels.min(axis=(0, 1)), texture.pixels.max(axis=(0, 1))
     return low.tolist() if float((high - low).max()) <= whole * 0.5 / 255.0 else None
+
+
+def written_notes(written: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """A line for each mesh format whose file holds invalid uv."""
+    return [
+        f"the {kind} holds {found['flipped']} flipped triangles and {found['overlapping']} pairs that overlap in uv"
+        for kind, found in written.items()
+        if found["flipped"] or found["overlapping"]
+    ]
 
 
 def texture_notes(facts: Mapping[str, Any]) -> list[str]:

@@ -50,6 +50,16 @@ def test_every_option_is_in_the_report(square: Path) -> None:
     asked = {"normal_format": "directx", "rays": 9, "seed": 7, "maps": ["position"], "padding": 2, "high": []}
     assert {name: report["settings"][name] for name in asked} == asked
     assert {"udim", "cage", "match_names", "fields", "layers", "texture_format"} <= set(report["settings"])
+    numbers = report["textures"]["settings"]
+    assert numbers["closing"] == {
+        "visible": 0.5 / 255,
+        "beside": 1e-3,
+        "inside": 0.1,
+        "reach": 2.0,
+        "steps": 100,
+        "accuracy": 1e-6,
+    }
+    assert {"ray_offset", "curvature_radius", "texture_sharpening", "high_layers", "border_reach"} <= set(numbers)
 
 
 def test_layers_share_one_file(square: Path) -> None:

@@ -10,6 +10,7 @@ normal, so that rays do not hit the face they start from.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,7 @@ def ambient_occlusion(
         return (1.0 - np.count_nonzero(blocked.reshape(-1, count), axis=1)[:, None] / count).astype(np.float32)
 
     scene = scene or RayScene.of(asset.surface)
-    return _gather(gbuffer, atlas, asset, settings, scene, open_part, channels=1)
+    return _gather(gbuffer, atlas, asset, settings, scene, Estimate(open_part, 1))
 
 
 def bent_normals(
@@ -103,7 +104,7 @@ def bent_normals(
         return _unit_or(total, normal)
 
     scene = scene or RayScene.of(asset.surface)
-    return _gather(gbuffer, atlas, asset, settings, scene, mean_open, channels=3)
+    return _gather(gbuffer, atlas, asset, settings, scene, Estimate(mean_open, 3))
 
 
 def thickness(
@@ -128,7 +129,7 @@ def thickness(
         return np.minimum(depth.sum(axis=1) / np.maximum(count, 1), 1.0)[:, None].astype(np.float32)
 
     scene = scene or RayScene.of(asset.surface)
-    return _gather(gbuffer, atlas, asset, settings, scene, mean_depth, channels=1, inwards=True)
+    return _gather(gbuffer, atlas, asset, settings, scene, Estimate(mean_depth, 1, inwards=True))
 
 
 def starting_points(
@@ -175,18 +176,20 @@ def _with_scene(function: Callable[..., NDArray[np.float32]], settings: RaySetti
     return compute
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """What is made of rays: kernel(scene, origin, direction, normal) → (t, channels).  inwards: into the body."""
+
+    kernel: Kernel
+    channels: int
+    inwards: bool = False
+
+
 def _gather(
-    gbuffer: GBuffer,
-    atlas: Atlas,
-    asset: Asset,
-    settings: RaySettings,
-    scene: RayScene,
-    kernel: Kernel,
-    *,
-    channels: int,
-    inwards: bool = False,
+    gbuffer: GBuffer, atlas: Atlas, asset: Asset, settings: RaySettings, scene: RayScene, estimate: Estimate
 ) -> NDArray[np.float32]:
-    """(h, w, channels): kernel(scene, origin, direction, normal) of all covered texels, a batch of rays at a time."""
+    """(h, w, channels): the estimate at all covered texels, a batch of rays at a time."""
+    channels, inwards = estimate.channels, estimate.inwards
     patterns = sphere_patterns(settings.count, settings.seed)
     height, width = gbuffer.shape
     result = np.zeros((height * width, channels), np.float32)
@@ -195,7 +198,7 @@ def _gather(
         origin, normal = starting_points(gbuffer, atlas, asset, scene.frame, texels, inwards=inwards)
         axis = -normal if inwards else normal
         direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(texels), gbuffer.side), axis)
-        result[texels] = kernel(scene, origin, direction, normal)
+        result[texels] = estimate.kernel(scene, origin, direction, normal)
 
     in_batches(batch, gbuffer.texels, max(BATCH // settings.count, 1), settings.progress)
     return result.reshape(height, width, channels)

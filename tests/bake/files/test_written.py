@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.files.usd import write_usda
 from flexpara.bake.files.written import corner_uv_of, written_report
+from flexpara.bake.output import written_notes
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.io.obj.write import write_obj
@@ -116,6 +117,7 @@ def test_what_rounding_collapses_is_found(pair: Callable[..., Pair], tmp_path: P
     thin = pair([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [[0.25, 1e-9], [0.75, 1e-9], [0.5, 1.5e-9]])
     report = written_report(written(thin, tmp_path), thin[0].uv[thin[0].faces])
     assert {kind: report[kind]["flipped"] for kind in FORMATS} == {"glb": 1, "obj": 0, "ply": 0, "usda": 0}
+    assert written_notes(report) == ["the glb holds 1 flipped triangles and 0 pairs that overlap in uv"]
     unread = written_report(dict.fromkeys(FORMATS), thin[0].uv[thin[0].faces])
     assert unread == {kind: {**report[kind], "read_back": False} for kind in FORMATS}
 
