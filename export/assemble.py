@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Surface
-from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
@@ -55,9 +54,9 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
 
     Raises: ParityError when the exported network and torch disagree.
     """
-    packing = PackConfig()
     with clock.stage("pack"):
-        atlas = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"], config=packing)
+        packed = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"])
+    atlas = packed.atlas
     with clock.stage("measure"):
         metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
     report: dict[str, Any] = {
@@ -66,7 +65,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
         "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
         "changes": asset.changes,
         "settings": {**trained.settings, "size": size, "padding": padding},
-        "pack": {"settings": asdict(packing)},
+        "pack": packed.report,
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),
         "train": trained.report,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 
 from .triangles import cross_2d
 
@@ -72,6 +72,27 @@ def facing_segments(
     return np.unique(np.sort(np.stack([owner[a[near]], owner[b[near]]], axis=1), axis=1), axis=0)
 
 
+def near_segments(
+    segments: NDArray[np.float64], chart: NDArray[np.int64], *, spacing: float, reach: float
+) -> NDArray[np.int64]:
+    """All pairs of segments of different charts that are at most reach apart, and some that are a little more.
+
+    Args:
+        segments: (s, 2, 2) float64 uv ends of the outline segments.
+        chart: (s,) int64 chart of each.
+        spacing: distance of the samples, uv units; the finer, the more of them and the fewer pairs too many.
+        reach: uv units.
+
+    Returns:
+        (p, 2) int64 segment indices.
+    """
+    points, owner, spacing = _samples(segments, spacing)
+    pairs = KDTree(points).query_pairs(reach + spacing, output_type="ndarray")
+    pairs = owner[pairs.astype(np.int64).reshape(-1, 2)]
+    pairs = np.sort(pairs[chart[pairs[:, 0]] != chart[pairs[:, 1]]], axis=1)
+    return np.unique(pairs, axis=0)
+
+
 def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) distances of segments first and second, both (n, 2, 2); 0 where they cross."""
     one, two = closest_points(first, second)
@@ -109,10 +130,16 @@ def _foot(point: NDArray[np.float64], segment: NDArray[np.float64]) -> NDArray[n
 
 def sample_segments(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points (n, 2) on the segments (s, 2, 2), ends included, at most spacing apart, and the segment (n,) of each."""
+    points, owner, _ = _samples(segments, spacing)
+    return points, owner
+
+
+def _samples(segments: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64], float]:
+    """The same, and the spacing in force: wider where it would take too many."""
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     spacing = max(spacing, float(length.sum()) / _MOST_SAMPLES)
     steps = np.maximum(np.ceil(length / spacing).astype(np.int64), 1)
     owner = np.repeat(np.arange(len(segments)), steps + 1)
     index = np.arange(len(owner)) - np.repeat(np.cumsum(steps + 1) - (steps + 1), steps + 1)
     share = (index / steps[owner])[:, None]
-    return segments[owner, 0] * (1.0 - share) + segments[owner, 1] * share, owner
+    return segments[owner, 0] * (1.0 - share) + segments[owner, 1] * share, owner, spacing

@@ -1,6 +1,6 @@
 """Every number that decides where charts go, in small frozen dataclasses that are saved with each result.
 
-Cells are those of the coarse grid on which charts are placed; shares are of the side of the atlas.
+Shares are of the side of the atlas.
 """
 
 from __future__ import annotations
@@ -10,46 +10,72 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class PlaceConfig:
-    """Silhouettes on the coarse grid, and the search over their quarter turns."""
+    """The first layout: charts dropped on a skyline, and the search over orders and widths."""
 
-    cells: int = 256
-    """Cells per side that up to 24 charts are meant to fill; more charts get up to four times as many."""
+    columns: float = 12.0
+    """Columns of the skyline, times √(number of charts) …"""
+    least: int = 128
+    """… but at least so many …"""
+    most: int = 1536
+    """… and at most."""
     fill: float = 0.6
-    """Share of those cells that charts and padding are sized to cover."""
-    spare: float = 1.4
-    """Side of the first square that is tried, over that."""
-    shrink: float = 0.7
-    """Factor on the charts' size where they don't fit even there …"""
-    shrinks: int = 12
-    """… and how often."""
-    few: int = 48
-    """Up to so many charts, places are searched exhaustively and the square to a single cell."""
-    coarse: float = 0.02
-    """How close the side is found for more charts, share of it."""
-    tries: int = 60
-    """Sets of quarter turns that are tried at most …"""
-    tried_charts: int = 600
-    """… and charts that are placed in all of them together, at least once each."""
+    """Share of the square that charts are first thought to fill."""
+    sizings: int = 12
+    """How often their size is corrected until their first layout just fits."""
+    alike: float = 0.05
+    """By how much it may then be smaller than the square, share of the side."""
+    long: float = 1.0
+    """Length of a chart, in sides of a square of the area of all charts, from which diagonals are tried for it."""
+    tightness: float = 1.0
+    """What a buried column counts against a top that is higher by as much."""
+    tries: int = 400
+    """Orders that are tried at most …"""
+    dropped: int = 4000
+    """… and charts that are dropped in all of them together."""
+    shuffle: float = 0.3
+    """By how much (natural logarithm) sizes are falsified for a new order, typically."""
 
 
 @dataclass(frozen=True)
 class GrowthConfig:
     """Linear programs that move placed charts and let them grow until they jam."""
 
-    rounds: int = 3
+    few: int = 128
+    """Up to so many charts are moved; more only grow where they lie."""
+    rounds: int = 4
     """How often the pairs of facing segments are found anew."""
     steps: int = 4
     """Linear programs a round."""
-    trust: float = 1.0 / 128.0
+    trust: float = 1.0 / 100.0
     """Farthest that a chart moves in the first step, share; less where there are more than 24 charts."""
     calmer: float = 0.75
     """Factor on it from step to step."""
+    smaller: float = 0.1
+    """Factor on it after a round in which charts came too close to each other, which is undone."""
     reach: float = 1.0 / 8.0
     """Segments this much farther apart than the closest ones still count as facing each other, share."""
-    sample: float = 1.0 / 1024.0
+    sample: float = 1.0 / 512.0
     """Distance of the samples by which facing segments are found, share."""
     repairs: int = 40
     """How often the exact distances may still find a pair too close in the end."""
+
+
+@dataclass(frozen=True)
+class LatticeConfig:
+    """The repair of triangles that rounding would turn over; lengths in lattice units, 2⁻²⁴ of the side."""
+
+    height: float = 2.0
+    """Least height of a triangle there: from √2 on, rounding can't turn it over."""
+    deepest: float = 64.0
+    """How far faces may overlap, or a triangle be turned over, to be repaired: more is a fault of the chart."""
+    relaxation: float = 1.8
+    """Factor on the steps of the repair: over-relaxation, below 2."""
+    sweeps: int = 500
+    """Steps of the repair a round."""
+    rounds: int = 8
+    """How often it starts from what the exact tests still find."""
+    retries: int = 3
+    """How often charts are given more room where the repair moved a vertex farther than the room they had."""
 
 
 @dataclass(frozen=True)
@@ -58,3 +84,4 @@ class PackConfig:
 
     place: PlaceConfig = field(default_factory=PlaceConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
+    lattice: LatticeConfig = field(default_factory=LatticeConfig)

@@ -17,7 +17,7 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array, vstack
 
 from ..errors import FinishError
-from ..geometry.gaps import closest_points, facing_segments, segment_distance
+from ..geometry.gaps import closest_points, facing_segments, near_segments, segment_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,11 +36,15 @@ def apply_placement(
 
 
 def grown(
-    placement: NDArray[np.float64], outlines: list[NDArray[np.float64]], size: int, padding: int, config: GrowthConfig
-) -> NDArray[np.float64]:
+    placement: NDArray[np.float64],
+    outlines: list[NDArray[np.float64]],
+    size: int,
+    padding: int,
+    config: GrowthConfig,
+    *,
+    slack: float = 2.0**-23,
+) -> tuple[NDArray[np.float64], int]:
     """The placement (k, 2, 3) with charts shifted and grown as far as the padding allows; never turned or mirrored.
-
-    Distances keep a few float32 steps more than the padding, so that rounding doesn't undercut it.
 
     Args:
         placement: (k, 2, 3) float64, chart coordinates → atlas uv, with the padding kept.
@@ -48,6 +52,10 @@ def grown(
         size: texels per side.
         padding: texels.
         config: numbers.
+        slack: what is kept free around each chart beyond the padding, atlas units: rounding must not undercut it.
+
+    Returns:
+        The new placement, and how many of the linear programs had no solution (their step is left out).
 
     Raises:
         FinishError: the padding was not kept to begin with and cannot be restored.
@@ -57,18 +65,13 @@ def grown(
     parts = np.split(segments, np.cumsum([len(outline) for outline in outlines])[:-1])
     box = np.array([(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for part in parts])
     centre = box.mean(axis=1)
-    border, apart = padding / size + 2.0**-23, 2.0 * padding / size + 2.0**-22
+    border, apart = padding / size + slack, 2.0 * (padding / size + slack)
     fit = (1.0 - 2.0 * border) / float(np.ptp(box.reshape(-1, 2), axis=0).max())
     fitted = border + fit * (centre - box.reshape(-1, 2).min(axis=0))
     crowd = _Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
-    trust = config.trust / max(1.0, math.sqrt(len(outlines) / 24.0))
-    for number in range(config.rounds):
-        pairs = facing_segments(crowd.segments(), chart, spacing=config.sample, reach=config.reach)
-        for step in range(config.steps):
-            crowd = _step(crowd, pairs, border, apart, trust * config.calmer ** (number * config.steps + step))
-    crowd = _settled(crowd, border, apart, config)
+    crowd, skipped = _grown(_settled(crowd, border, apart, config), border, apart, config)
     linear, shift = placement[:, :, :2] * crowd.factor, (placement[:, :, 2] - centre) * crowd.factor + crowd.centre
-    return np.concatenate([linear, shift[:, :, None]], axis=2)
+    return np.concatenate([linear, shift[:, :, None]], axis=2), skipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +88,27 @@ class _Crowd:
         return self.centre[self.chart][:, None] + self.factor * self.local
 
 
-def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, trust: float) -> _Crowd:
+def _grown(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> tuple[_Crowd, int]:
+    """The crowd after rounds of linear programs, each kept where charts really grew, and the programs left out."""
+    k, skipped = len(crowd.centre), 0
+    trust = config.trust / max(1.0, math.sqrt(k / 24.0))
+    for _ in range(config.rounds if k <= config.few else 0):
+        pairs = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.reach)
+        moved = crowd
+        for step in range(config.steps):
+            found = _step(moved, pairs, border, apart, trust * config.calmer**step)
+            moved, skipped = found or moved, skipped + (found is None)
+        moved = _settled(moved, border, apart, config)
+        trust *= config.calmer**config.steps if moved.factor > crowd.factor else config.smaller
+        crowd = max(crowd, moved, key=lambda one: one.factor)
+    return crowd, skipped
+
+
+def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, trust: float) -> _Crowd | None:
     """One linear program: the largest growth of the factor, shifts and growth of a box within trust (uv units).
 
-    Two outlines then come closer by 4·√2·trust at most, so pairs with more room than that are left out.
+    None where it has no solution.  Two outlines come closer by 4·√2·trust at most, so pairs with more room than that
+    are left out.
     """
     rows, room = _pair_rows(crowd, pairs, apart)
     near = room <= 6.0 * trust
@@ -102,7 +122,7 @@ def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, 
         objective, A_ub=vstack([rows[near], walls]), b_ub=np.concatenate([room[near], wall_room]), bounds=limits
     )
     if found.status != 0:
-        return crowd
+        return None
     return replace(crowd, centre=crowd.centre + found.x[:-1].reshape(k, 2), factor=crowd.factor + float(found.x[-1]))
 
 
@@ -136,10 +156,11 @@ def _settled(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -
     """The crowd with the largest factor that keeps all distances exactly, charts where they are."""
     room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
     walls = float((room / np.maximum(crowd.half, 1e-300)).min())
-    pairs = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.reach)
+    spacing = max(config.sample / 2.0, apart / 2.0)
+    pairs = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart + spacing)
     for _ in range(config.repairs):
         crowd = replace(crowd, factor=_largest_factor(crowd, pairs, apart, walls))
-        closest = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.sample)
+        closest = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart)
         if _free(crowd, closest, apart):
             return crowd
         pairs = np.concatenate([pairs, closest])

@@ -78,7 +78,7 @@ def both_ways(asset: Asset, charts: Charts, folder: Path) -> tuple[UnwrapSession
     """The two sessions of an atlas."""
     frame = Frame.of(asset.surface.vertices)
     ball = Surface(frame.apply(asset.surface.vertices), asset.surface.faces)
-    atlas = pack(asset, charts, size=512, padding=2)
+    atlas = pack(asset, charts, size=512, padding=2).atlas
 
     def silence(*_: Any, **__: Any) -> None:
         """Progress that nobody watches."""

@@ -10,6 +10,7 @@ import pytest
 from flexpara.runtime.geometry.gaps import (
     closest_points,
     facing_segments,
+    near_segments,
     sample_segments,
     segment_distance,
     smallest_chart_gap,
@@ -67,6 +68,10 @@ def test_random_rectangles_agree_with_all_pairs(seed: int) -> None:
     assert gap(*boxes, spacing=0.05) == pytest.approx(expected, abs=1e-12)
     pairs = facing_segments(segments, chart, spacing=0.05, reach=0.1)
     assert (chart[pairs[:, 0]] != chart[pairs[:, 1]]).all()
+    near = {tuple(pair) for pair in near_segments(segments, chart, spacing=0.05, reach=0.2).tolist()}
+    close = segment_distance(segments[i], segments[j]) <= 0.2
+    assert near >= set(zip(i[close].tolist(), j[close].tolist(), strict=True))
+    assert all(chart[one] != chart[other] for one, other in near)
 
 
 def test_closest_points_lie_on_their_segments() -> None:

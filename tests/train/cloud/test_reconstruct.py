@@ -58,7 +58,7 @@ def unwrapped(cloud: PointCloud, settings: TrainConfig = QUICK) -> tuple[CloudMe
     """Triangles, atlas, and the uv and chart of the user's points."""
     mesh = reconstruct(cloud)
     trained = train(mesh.asset.surface, settings, lambda *_, **__: None)
-    atlas = pack(mesh.asset, trained.charts, size=1024, padding=4)
+    atlas = pack(mesh.asset, trained.charts, size=1024, padding=4).atlas
     return mesh, atlas, *point_uv(mesh, atlas)
 
 
