@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .runtime.options import Options, Outputs
     from .runtime.progress import Progress
     from .runtime.sessions.session import UnwrapSession
-    from .train.learn.networks import AtlasNetworks
+    from .train.deploy.gated import GatedExperts
 
 __version__ = "0.1.0"
 __all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResult", "UnwrapSession", "load", "unwrap"]
@@ -175,8 +175,8 @@ class UnwrapResult:
         return point_uv(self.cloud_mesh, self.atlas)
 
     @property
-    def model(self) -> AtlasNetworks:
-        """The torch module behind the ONNX file."""
+    def model(self) -> GatedExperts:
+        """The networks behind the ONNX file, in numpy: unit ball (n, 3) float32 → chart coordinates, chart, score."""
         return self.found.model
 
     @property

@@ -18,13 +18,14 @@ from ..runtime.pack.packing import pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
 from .metadata import Provenance
-from .onnx import export_onnx
-from .raw import raw_onnx
+from .networks import export_networks
 
 if TYPE_CHECKING:
+    from torch import nn
+
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.progress import Clock
-    from ..train.learn.networks import AtlasNetworks
+    from ..train.deploy.gated import GatedExperts
     from ..train.pipeline import Trained
 
 REPORT_VERSION = 1
@@ -35,7 +36,7 @@ class Unwrapped:
     """An unwrapped mesh.
 
     charts: flat, not packed.  frame: source units → unit ball.  atlas: packed charts.
-    model: the torch module behind the ONNX file.  onnx: the bytes of that file.
+    model: the networks behind the ONNX file, in numpy.  onnx: the bytes of that file.
     paper: those of the networks of preset paper as they were trained, else None.
     report: changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON.
     """
@@ -43,7 +44,7 @@ class Unwrapped:
     charts: Charts
     frame: Frame
     atlas: Atlas
-    model: AtlasNetworks
+    model: GatedExperts
     onnx: bytes = field(repr=False)
     report: dict[str, Any] = field(repr=False)
     paper: bytes | None = field(default=None, repr=False)
@@ -52,7 +53,7 @@ class Unwrapped:
 def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding: int) -> Unwrapped:
     """Pack, measure, export.
 
-    Raises: ParityError when the exported network and torch disagree.
+    Raises: ParityError when the exported file and its networks disagree.
     """
     with clock.stage("pack"):
         packed = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"])
@@ -73,10 +74,10 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     with clock.stage("export"), TemporaryDirectory() as folder:
         path = Path(folder) / "atlas.onnx"
         facts = Provenance(asset.sha256, report["settings"], report["metrics"])
-        parity = export_onnx(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
+        parity = export_networks(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
         network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
-        paper = None if trained.paper is None else raw_onnx(trained.paper, asset.surface, trained.frame, size, facts)
+        paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, size, facts)
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
@@ -85,7 +86,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
 def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[str, Any]]:
     """The inverse map uv, chart → point, normal as an ONNX file's bytes, and how well it agrees with the surface.
 
-    Raises: ParityError when the exported network and torch disagree.
+    Raises: ParityError when the exported file and its networks disagree.
     """
     from ..runtime.sessions.wrapagreement import inverse_agreement
     from ..runtime.sessions.wrapsession import WrapSession
@@ -93,10 +94,18 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
     from .wrap import export_wrap
 
     ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)
-    model = fit_wrap(ball, found.charts, seed=found.report["settings"]["seed"], progress=clock)
+    seed = found.report["settings"]["seed"]
+    model = fit_wrap(ball, found.charts, found.atlas.corner_uv, seed=seed, progress=clock)
     with clock.stage("export inverse"), TemporaryDirectory() as folder:
         path = Path(folder) / "atlas.wrap.onnx"
         facts = Provenance(asset.sha256, found.report["settings"], found.report["metrics"])
         export_wrap(model, found.frame, found.atlas, found.charts, path, metadata=facts)
         agreed = inverse_agreement(WrapSession(path), asset.surface, found.atlas)
         return path.read_bytes(), agreed.to_dict()
+
+
+def _paper_file(model: nn.Module, asset: Asset, frame: Frame, size: int, facts: Provenance) -> bytes:
+    """The networks of preset paper as they were trained; torch is loaded for them alone."""
+    from .raw import raw_onnx
+
+    return raw_onnx(model, asset.surface, frame, size, facts)

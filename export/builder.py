@@ -56,6 +56,13 @@ class GraphBuilder:
         self.nodes.append(helper.make_node(kind, list(inputs), [output], name=f"node_{output}", **attributes))
         return output
 
+    def split(self, whole: str, sizes: list[int], *, axis: int) -> list[str]:
+        """Append the node that cuts ``whole`` along an axis; returns the names of the parts."""
+        parts = [f"split_{len(self.nodes)}_{i}" for i in range(len(sizes))]
+        node = helper.make_node("Split", [whole, self.axes(*sizes)], parts, name=f"node_{parts[0]}", axis=axis)
+        self.nodes.append(node)
+        return parts
+
     def serialize(
         self,
         inputs: Ends,

@@ -6,13 +6,19 @@ This is the truth that the parity proof compares with; the exported graph (onnx.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+import copy
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from .frames import fold_frame
+from .parity import Truth
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ..runtime.sessions.bundle import BundleMetadata
@@ -24,26 +30,6 @@ class PatchNetworks(Protocol):
     def forward(self, xyz: Tensor) -> tuple[Tensor, Tensor]:
         """Points xyz (n, 3) float32 in the unit ball → logits (n, p), uv (n, p, 2) in chart coordinates."""
         ...
-
-
-class FoldedFrame(NamedTuple):
-    """A frame in float32 without loss: xyz = ((points − centre) − centre_rest) / scale.
-
-    Near a far-away centre, points − centre is exact in float32; centre_rest is what rounding the centre lost.
-    centre, centre_rest: (3,) float32.  scale: () float32.
-    """
-
-    centre: NDArray[np.float32]
-    centre_rest: NDArray[np.float32]
-    scale: NDArray[np.float32]
-
-
-def fold_frame(metadata: BundleMetadata) -> FoldedFrame:
-    """The frame of the metadata, split into float32 parts."""
-    exact = np.asarray(metadata.frame.centre, dtype=np.float64)
-    centre = exact.astype(np.float32)
-    rest = (exact - centre.astype(np.float64)).astype(np.float32)
-    return FoldedFrame(centre, rest, np.asarray(metadata.frame.scale, dtype=np.float32))
 
 
 def chart_membership(metadata: BundleMetadata) -> NDArray[np.float32]:
@@ -93,3 +79,28 @@ class UnwrapGraph(nn.Module):
         place = self.placement[chart]
         uv = (place[:, :, :2] @ flat[:, :, None])[:, :, 0] + place[:, :, 2]
         return uv.clamp(0.0, 1.0), chart, score
+
+
+def truth_of(graph: UnwrapGraph, tie: float) -> Callable[[NDArray[np.float32]], Truth]:
+    """The graph as parity.py asks for it; two logits closer than tie × (1 + max |logit|) are a tie."""
+
+    @torch.no_grad()
+    def answer(points: NDArray[np.float32]) -> Truth:
+        logits, patch_uv = graph.logits_and_uv(torch.from_numpy(points))
+        uv, chart, score = (tensor.numpy() for tensor in graph.choose(logits, patch_uv))
+        return Truth(uv, chart, score, logits.argmax(dim=1).numpy(), ~_ties(logits.numpy(), tie))
+
+    return answer
+
+
+def frozen_copy(model: nn.Module) -> nn.Module:
+    """A float32 copy on the CPU, in evaluation mode, without gradients."""
+    return copy.deepcopy(model).to("cpu", torch.float32).eval().requires_grad_(False)
+
+
+def _ties(logits: NDArray[np.float32], tie: float) -> NDArray[np.bool_]:
+    """(n,) True where the two largest logits of (n, p) are too close to say which patch wins."""
+    if logits.shape[1] == 1:
+        return np.zeros(len(logits), dtype=np.bool_)
+    ordered = np.sort(logits, axis=1)
+    return ordered[:, -1] - ordered[:, -2] <= tie * (1.0 + np.abs(logits).max(axis=1))

@@ -1,4 +1,4 @@
-"""Writes the self-describing ONNX file, once it is proven equal to the torch model.
+"""Writes torch networks as a self-describing ONNX file, once it is proven equal to them: those of preset paper.
 
 n points · p patches · k charts.  Input `points` (n, 3) float32, source units; outputs `uv` (n, 2) float32 in [0, 1]²,
 v up, `chart` (n) int64, `score` (n) float32.  Frame and packing are folded in; runtime/bundle.py's JSON is attached.
@@ -17,11 +17,12 @@ import torch
 
 from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
-from .graph import UnwrapGraph, chart_membership, fold_frame
+from .frames import unit_ball
+from .graph import UnwrapGraph, chart_membership, frozen_copy, truth_of
 from .lowering import Lowering, Value, cut_to_patch, is_per_patch, trace
 from .metadata import Provenance, bundle_metadata
 from .parity import ParityReport, ParitySpec, probe_points, prove_parity
-from .proven import FileKind, check_folder, frozen_copy, write_proven
+from .proven import POINT_MAP, FileKind, check_folder, write_proven
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,11 +31,6 @@ if TYPE_CHECKING:
 
     from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
-    from .builder import Ends
-
-
-INPUTS: Ends = {"points": ("float32", ["n", 3])}
-OUTPUTS: Ends = {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"]), "score": ("float32", ["n"])}
 
 
 @dataclass(frozen=True)
@@ -83,8 +79,8 @@ def export_onnx(
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
     content = build_model(model, facts, spec)
     points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
-    graph = UnwrapGraph(frozen_copy(model), facts)
-    return write_proven(path, content, lambda content: prove_parity(graph, content, points, spec.parity))
+    truth = truth_of(UnwrapGraph(frozen_copy(model), facts), spec.parity.tie)
+    return write_proven(path, content, lambda content: prove_parity(truth, content, points, spec.parity))
 
 
 def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) -> bytes:
@@ -94,7 +90,7 @@ def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) ->
     _check_shapes(frozen, metadata.patch_count)
     with torch.no_grad():
         _write_graph(builder, trace(frozen), metadata, spec)
-    return spec.kind.serialize(builder, INPUTS, OUTPUTS, metadata, metadata.to_json(), "unwrap")
+    return spec.kind.serialize(builder, *POINT_MAP, metadata, metadata.to_json(), "unwrap")
 
 
 def _check_shapes(model: nn.Module, patches: int) -> None:
@@ -106,7 +102,7 @@ def _check_shapes(model: nn.Module, patches: int) -> None:
 
 
 def _write_graph(builder: GraphBuilder, traced: fx.GraphModule, metadata: BundleMetadata, spec: ExportSpec) -> None:
-    xyz = Value(_unit_ball(builder, metadata), 2)
+    xyz = Value(unit_ball(builder, metadata), 2)
     every = Lowering(traced, builder, xyz)
     logits = every.result(0)
     patches = metadata.patch_count
@@ -120,14 +116,6 @@ def _write_graph(builder: GraphBuilder, traced: fx.GraphModule, metadata: Bundle
         uv = _chosen_uv(builder, every.result(1).name, patch, chart, metadata)
     zero, one = (builder.constant(np.asarray(bound, dtype=np.float32)) for bound in (0.0, 1.0))
     builder.op("Clip", uv, zero, one, name="uv")
-
-
-def _unit_ball(builder: GraphBuilder, metadata: BundleMetadata) -> str:
-    """Points to unit ball.  The session zeroes centre and centre_rest: it subtracts the frame's centre in float64."""
-    folded = fold_frame(metadata)
-    near = builder.op("Sub", "points", builder.named("centre", folded.centre))
-    exact = builder.op("Sub", near, builder.named("centre_rest", folded.centre_rest))
-    return builder.op("Div", exact, builder.named("scale", folded.scale), name="xyz")
 
 
 def _chart_score(builder: GraphBuilder, logits: str, chart: str, metadata: BundleMetadata) -> str:

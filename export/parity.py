@@ -1,4 +1,4 @@
-"""The proof that an exported graph equals the torch model: both run on the same points, and every output is compared.
+"""The proof that an exported graph equals its model: both run on the same points, and every output is compared.
 
 n points · p patches · Δ difference.  uv in [0, 1]², score in [0, 1].
 """
@@ -6,28 +6,26 @@ n points · p patches · Δ difference.  uv in [0, 1]², score in [0, 1].
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import onnxruntime
-import torch
 from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidArgument, InvalidGraph, RuntimeException
 from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNotImplemented
 
 from ..runtime.errors import ParityError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Atlas, Frame
-    from .graph import UnwrapGraph
 
 
 @dataclass(frozen=True)
 class ParitySpec:
-    """Where torch and onnxruntime are compared, and how closely they must agree."""
+    """Where model and onnxruntime are compared, and how closely they must agree."""
 
     sizes: tuple[int, ...] = (1, 2, 1000)
     """Numbers of points n; 1 finds a frozen axis, 2 a squeezed one."""
@@ -39,6 +37,20 @@ class ParitySpec:
     """Two logits closer than this × (1 + max |logit|) are a tie: either patch may win, and the point is left out."""
     seed: int = 0
     """Seed of the probe points."""
+
+
+class Truth(NamedTuple):
+    """What a model says at n points.
+
+    uv (n, 2) float32, chart (n,) int64, score (n,) float32: what the file has to say.  patch (n,): which network
+    answered.  clear (n,) bool: False where two are so close that rounding decides.
+    """
+
+    uv: NDArray[np.float32]
+    chart: NDArray[np.int64]
+    score: NDArray[np.float32]
+    patch: NDArray[np.int64]
+    clear: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -78,8 +90,10 @@ def probe_points(
     return points.astype(np.float32)
 
 
-def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32], spec: ParitySpec) -> ParityReport:
-    """Compare the torch graph with the ONNX model ``content`` at the first n of ``points``, n in spec.sizes.
+def prove_parity(
+    model: Callable[[NDArray[np.float32]], Truth], content: bytes, points: NDArray[np.float32], spec: ParitySpec
+) -> ParityReport:
+    """Compare a model with its ONNX file's ``content`` at the first n of ``points``, n in spec.sizes.
 
     Raises:
         ParityError: names the output, n, max |Δ| and what was allowed; or most points are ties and prove nothing.
@@ -91,14 +105,12 @@ def prove_parity(graph: UnwrapGraph, content: bytes, points: NDArray[np.float32]
     for n in spec.sizes:
         sample = points[:n]
         uv, chart, score = run_model(session, ("uv", "chart", "score"), {"points": sample})
-        with torch.no_grad():
-            logits, patch_uv = graph.logits_and_uv(torch.from_numpy(sample))
-            truth = [tensor.numpy() for tensor in graph.choose(logits, patch_uv)]
-        clear = ~_ties(logits.numpy(), spec.tie)
-        uv_error = max(uv_error, largest_difference("uv", uv, truth[0], clear, n, spec.uv_atol))
-        largest_difference("chart", chart, truth[1], clear, n, 0.0)
-        score_error = max(score_error, largest_difference("score", score, truth[2], clear, n, spec.score_atol))
-        answered.update(logits.argmax(dim=1)[torch.from_numpy(clear)].tolist())
+        truth = model(sample)
+        clear = truth.clear
+        uv_error = max(uv_error, largest_difference("uv", uv, truth.uv, clear, n, spec.uv_atol))
+        largest_difference("chart", chart, truth.chart, clear, n, 0.0)
+        score_error = max(score_error, largest_difference("score", score, truth.score, clear, n, spec.score_atol))
+        answered.update(truth.patch[clear].tolist())
         compared, ties = compared + int(clear.sum()), ties + int((~clear).sum())
     if ties > compared:
         found = f"{ties} of {compared + ties} probe points are ties between patches"
@@ -130,21 +142,13 @@ def run_model(
     return [np.asarray(output) for output in found]
 
 
-def _ties(logits: NDArray[np.float32], tie: float) -> NDArray[np.bool_]:
-    """(n,) True where the two largest logits of (n, p) are too close to say which patch wins."""
-    if logits.shape[1] == 1:
-        return np.zeros(len(logits), dtype=np.bool_)
-    ordered = np.sort(logits, axis=1)
-    return ordered[:, -1] - ordered[:, -2] <= tie * (1.0 + np.abs(logits).max(axis=1))
-
-
 def largest_difference(
     name: str, found: NDArray[np.generic], truth: NDArray[np.generic], clear: NDArray[np.bool_], n: int, atol: float
 ) -> float:
     """Largest |Δ| over the points without a tie."""
     remedy = "report this model, nothing was written"
     if found.shape != truth.shape or found.dtype != truth.dtype:
-        shapes = f"{found.shape} {found.dtype} from onnxruntime, {truth.shape} {truth.dtype} from torch"
+        shapes = f"{found.shape} {found.dtype} from onnxruntime, {truth.shape} {truth.dtype} from the model"
         raise ParityError(f"{name} at n = {n}: {shapes}, expected the same; {remedy}")
     delta = np.abs(found[clear].astype(np.float64) - truth[clear].astype(np.float64))
     error = float(delta.max(initial=0.0))

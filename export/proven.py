@@ -1,13 +1,9 @@
-"""What both exported maps share: the kind of file, a frozen copy of the model, and writing once a proof has passed."""
+"""What both exported maps share: the kind of file, and writing once a proof has passed."""
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
-
-import torch
-from torch import nn
 
 from ..runtime.errors import MissingFileError
 from ..runtime.files import replace_file
@@ -21,6 +17,12 @@ if TYPE_CHECKING:
     from .builder import Ends, GraphBuilder
 
 Report = TypeVar("Report")
+
+POINT_MAP: tuple[Ends, Ends] = (
+    {"points": ("float32", ["n", 3])},
+    {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"]), "score": ("float32", ["n"])},
+)
+"""Inputs and outputs of a map from surface points to the atlas."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,6 @@ class FileKind:
             metadata={METADATA_KEY: text},
             name=name,
         )
-
-
-def frozen_copy(model: nn.Module) -> nn.Module:
-    """A float32 copy on the CPU, in evaluation mode, without gradients."""
-    return copy.deepcopy(model).to("cpu", torch.float32).eval().requires_grad_(False)
 
 
 def check_folder(path: Path) -> None:

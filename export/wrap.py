@@ -1,52 +1,59 @@
-"""Writes `<stem>.wrap.onnx`, the inverse of an atlas, once it is proven equal to the torch model.
+"""Writes `<stem>.wrap.onnx`, the inverse of an atlas, once it is proven equal to its networks.   No torch.
 
-n rows · p patches · k charts.  Inputs `uv` (n, 2) float32 in [0, 1]², v up, and `chart` (n) int64; outputs `points`
-(n, 3) float32 in source units and `normals` (n, 3) float32 of unit length.  Frame and packing are folded in;
-runtime/bundle.py's JSON is attached, with kind "wrap".
-
-Each row visits its chart's Assign-Net, where the chart has several patches, and then one patch's Wrap-Net: rows are
-gathered by chart and patch, answered, and scattered back into NaN, which is what rows of no known chart stay.
+n rows · k charts.  Inputs `uv` (n, 2) float32 in [0, 1]², v up, and `chart` (n) int64; outputs `points` (n, 3) float32
+in source units and `normals` (n, 3) float32 of unit length.  The frame is folded in; runtime/sessions/bundle.py's JSON
+is attached, with kind "wrap".  Rows of a chart that does not exist are NaN.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
-from torch import Tensor, nn
+from onnx import TensorProto
 
+from ..runtime.errors import ParityError, ShapeError
 from ..runtime.sessions.wrapsession import wrap_json
-from ..train.deploy.fit_wrap import patch_table
-from .builder import GraphBuilder
-from .graph import fold_frame
-from .lowering import Lowering, Value, cut_to_patch, trace
+from ..train.deploy.fit_wrap import HEIGHT, on_layers
+from .builder import Ends, GraphBuilder
+from .frames import fold_frame
+from .gatedgraph import write_gated
 from .metadata import Provenance, bundle_metadata
-from .proven import FileKind, check_folder, frozen_copy, write_proven
-from .wrapgraph import (
-    WrapGraph,
-    WrapParityReport,
-    WrapParitySpec,
-    check_shapes,
-    fold_placement,
-    probe_uv,
-    prove_inverse,
-)
+from .parity import largest_difference, load_model, run_model
+from .proven import FileKind, check_folder, write_proven
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-    from torch import fx
 
     from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
-    from .builder import Ends
-
+    from ..train.deploy.gated import GatedExperts
 
 INPUTS: Ends = {"uv": ("float32", ["n", 2]), "chart": ("int64", ["n"])}
 OUTPUTS: Ends = {"points": ("float32", ["n", 3]), "normals": ("float32", ["n", 3])}
+SHORTEST = 1e-12
+"""Normals shorter than this are not made longer."""
+
+
+@dataclass(frozen=True)
+class WrapParitySpec:
+    """Where networks and onnxruntime are compared, and how closely they must agree."""
+
+    sizes: tuple[int, ...] = (1, 2, 1000)
+    """Numbers of rows n; 1 finds a frozen axis, 2 a squeezed one."""
+    points_atol: float = 1e-5
+    """Largest |Δpoints| as a share of the frame's scale.
+
+    What float32 loses at the frame's centre comes on top: WrapSession does not."""
+    normals_atol: float = 1e-3
+    """Largest |Δnormals|."""
+    tie: float = 1e-6
+    """Distance from a gate or a cell's side (atlas, cells) within which rounding decides."""
+    seed: int = 0
+    """Seed of the probes."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +63,51 @@ class WrapSpec:
     kind: FileKind = field(default_factory=FileKind)
     """Which onnxruntime can read it."""
     parity: WrapParitySpec = field(default_factory=WrapParitySpec)
-    """Where and how closely torch and onnxruntime must agree."""
+    """Where and how closely networks and onnxruntime must agree."""
+
+
+@dataclass(frozen=True)
+class WrapParityReport:
+    """What the proof found.
+
+    compared, ties: rows of all sizes together, and those left out.  points_error: max |Δ| as a share of the frame's
+    scale.  normals_error: max |Δ|.
+    """
+
+    sizes: tuple[int, ...]
+    compared: int
+    ties: int
+    points_error: float
+    normals_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Inverse:
+    """The map that a file holds.  networks: (u, v, height) (n, 3) → unit ball and normal (n, 6), chart, score."""
+
+    networks: GatedExperts
+    metadata: BundleMetadata
+
+    def inputs(self, uv: NDArray[np.float32], chart: NDArray[np.int64]) -> NDArray[np.float32]:
+        """(n, 3) what the networks see: charts that don't exist are clamped to those that do."""
+        charts = self.metadata.chart_count
+        return on_layers(uv, chart.clip(0, charts - 1), charts)
+
+    def __call__(
+        self, uv: NDArray[np.float32], chart: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Points (n, 3), clamped to the frame's box, and normals (n, 3) at uv (n, 2) of charts (n,)."""
+        value = self.networks(self.inputs(uv, chart)).value
+        folded = fold_frame(self.metadata)
+        points = value[:, :3].clip(-1.0, 1.0) * folded.scale + folded.centre_rest + folded.centre
+        normals = value[:, 3:] / np.maximum(np.linalg.norm(value[:, 3:], axis=1, keepdims=True), SHORTEST)
+        lost = (chart < 0) | (chart >= self.metadata.chart_count)
+        points[lost], normals[lost] = np.nan, np.nan
+        return points, normals.astype(np.float32)
 
 
 def export_wrap(
-    model: nn.Module,
+    networks: GatedExperts,
     frame: Frame,
     atlas: Atlas,
     charts: Charts,
@@ -69,139 +116,123 @@ def export_wrap(
     metadata: Provenance | None = None,
     spec: WrapSpec | None = None,
 ) -> WrapParityReport:
-    """Write the inverse and prove that it equals the torch model, or raise and leave nothing behind.
+    """Write the inverse and prove that it equals the networks, or raise and leave nothing behind.
 
-    Same model, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
+    Same networks, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
 
     Args:
-        model: see wrapgraph.WrapNetworks, and PatchChooser where a chart has several patches; p = len(patch_chart).
-            Neither moved nor changed.
+        networks: of fit_wrap().
         frame: source units → unit ball.
         atlas: of pack(); its placement must be set, its uv serve as probes.
-        charts: patch_chart and face_patch are used.
+        charts: those of the atlas.
         path: of the file; its folder exists.
         metadata: source hash, settings, metrics.
         spec: None = WrapSpec().
 
     Raises:
         ParityError: names the output, n, the largest difference and what was allowed.
-        InputError: metadata or placement that can't be written, as ShapeError: the model and the charts don't fit;
+        InputError: metadata or placement that can't be written, as ShapeError: networks of other inputs or outputs;
             as MissingFileError: the folder is absent.
-        FlexparaError: the model uses an operation that lowering.py does not know.
     """
     spec = spec or WrapSpec()
     check_folder(path)
+    if networks.weights.shape[1:] != (6, 4):
+        found = f"weights of shape {networks.weights.shape}"
+        raise ShapeError(f"{found}, expected (e, 6, 4): uv to position and normal; pass what fit_wrap gave")
     facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
-    content = build_inverse(model, facts, spec)
-    probes = probe_uv(atlas, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
-    graph = WrapGraph(frozen_copy(model), facts)
-    return write_proven(path, content, lambda content: prove_inverse(graph, content, probes, spec.parity))
+    inverse = Inverse(networks, facts)
+    content = build_inverse(inverse, spec.kind)
+    probes = probe_uv(atlas, max(spec.parity.sizes), spec.parity.seed)
+    return write_proven(path, content, lambda content: prove_inverse(inverse, content, probes, spec.parity))
 
 
-def build_inverse(model: nn.Module, metadata: BundleMetadata, spec: WrapSpec) -> bytes:
-    """The ONNX model in memory, checked by onnx, not yet proven equal to the torch model."""
-    builder, frozen = GraphBuilder(), frozen_copy(model)
-    with torch.no_grad():
-        check_shapes(frozen, metadata)
-        _write_graph(builder, frozen, metadata)
-    return spec.kind.serialize(builder, INPUTS, OUTPUTS, metadata, wrap_json(metadata), "wrap")
+def build_inverse(inverse: Inverse, kind: FileKind) -> bytes:
+    """The ONNX model in memory, checked by onnx, not yet proven equal to the networks."""
+    builder, metadata = GraphBuilder(), inverse.metadata
+    value = write_gated(builder, _layers(builder, metadata.chart_count), inverse.networks).value
+    nothing = builder.constant(np.asarray(np.nan, dtype=np.float32))
+    known = builder.op("Unsqueeze", _known(builder, metadata.chart_count), builder.axes(1))
+    for name, found in (("points", _points(builder, value[:3], metadata)), ("normals", _normals(builder, value[3:]))):
+        builder.op("Where", known, found, nothing, name=name)
+    return kind.serialize(builder, INPUTS, OUTPUTS, metadata, wrap_json(metadata), "wrap")
 
 
-class _Wrap(nn.Module):
-    """The model's wrap as a forward of uv alone, for whichever patch its parameters are cut to."""
-
-    first: Tensor
-
-    def __init__(self, model: nn.Module) -> None:
-        super().__init__()
-        self.model = model
-        self.register_buffer("first", torch.zeros(1, dtype=torch.int64))
-
-    def forward(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        return self.model.wrap(uv, self.first)  # type: ignore[operator]
+def _layers(builder: GraphBuilder, charts: int) -> str:
+    """(n, 3) the networks' inputs, see fit_wrap.on_layers."""
+    first, last = (builder.constant(np.asarray(bound, dtype=np.int64)) for bound in (0, charts - 1))
+    inside = builder.op("Min", builder.op("Max", "chart", first), last)
+    step = builder.constant(np.asarray(HEIGHT / charts, dtype=np.float32))
+    height = builder.op("Mul", builder.op("Cast", inside, to=TensorProto.FLOAT), step)
+    return builder.op("Concat", "uv", builder.op("Unsqueeze", height, builder.axes(1)), axis=1)
 
 
-class _Scores(_Wrap):
-    """Likewise its patch_scores, for whichever chart; lowering.py wants two results."""
-
-    def forward(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        return self.model.patch_scores(uv, self.first), uv  # type: ignore[operator]
-
-
-class _Traced(NamedTuple):
-    """The two maps, traced; scores is None where each chart is one patch."""
-
-    wrap: fx.GraphModule
-    scores: fx.GraphModule | None
+def _known(builder: GraphBuilder, charts: int) -> str:
+    """(n,) bool: the chart exists."""
+    first, last = (builder.constant(np.asarray(bound, dtype=np.int64)) for bound in (-1, charts))
+    return builder.op("And", builder.op("Greater", "chart", first), builder.op("Less", "chart", last))
 
 
-class _Rows(NamedTuple):
-    """ONNX names of some rows: their numbers (r,) among all, and their chart coordinates (r, 2)."""
-
-    numbers: str
-    plane: str
-
-
-def _write_graph(builder: GraphBuilder, model: nn.Module, metadata: BundleMetadata) -> None:
-    table = patch_table(np.asarray(metadata.patch_chart, dtype=np.int64), metadata.chart_count)
-    traced = _Traced(trace(_Wrap(model)), trace(_Scores(model)) if table.shape[1] > 1 else None)
-    numbers: list[str] = []
-    results: list[str] = []
-    for chart, row in enumerate(table):
-        of_chart = _rows_of_chart(builder, chart, metadata)
-        for patch, rows in _rows_of_patches(builder, traced, of_chart, chart, row[row >= 0], len(table)):
-            lowering = Lowering(
-                traced.wrap, builder, Value(rows.plane, 2), cut=cut_to_patch(patch, metadata.patch_count)
-            )
-            results.append(builder.op("Concat", *(lowering.result(i).name for i in (0, 1)), axis=1))
-            numbers.append(rows.numbers)
-    answers = _in_source_units(builder, builder.op("Concat", *results, axis=0), metadata)
-    order = builder.op("Unsqueeze", builder.op("Concat", *numbers, axis=0), builder.axes(1))
-    shape = builder.op("Concat", builder.op("Shape", "chart"), builder.axes(6), axis=0)
-    nothing = builder.op("Expand", builder.constant(np.full((1, 1), np.nan, dtype=np.float32)), shape)
-    every = builder.op("ScatterND", nothing, order, answers)
-    builder.op("Slice", every, *(builder.axes(i) for i in (0, 3, 1)), name="points")
-    builder.op("Slice", every, *(builder.axes(i) for i in (3, 6, 1)), name="normals")
-
-
-def _rows_equal(builder: GraphBuilder, labels: str, value: int) -> str:
-    """Indices (r,) where the int64 labels (n,) have that value."""
-    mine = builder.op("Equal", labels, builder.constant(np.asarray(value, dtype=np.int64)))
-    return builder.op("Squeeze", builder.op("NonZero", mine), builder.axes(0))
-
-
-def _rows_of_chart(builder: GraphBuilder, chart: int, metadata: BundleMetadata) -> _Rows:
-    """The rows of a chart, in its own coordinates."""
-    placement = fold_placement(metadata)
-    rows = _rows_equal(builder, "chart", chart)
-    shifted = builder.op("Sub", builder.op("Gather", "uv", rows, axis=0), builder.constant(placement.shift[chart]))
-    return _Rows(rows, builder.op("MatMul", shifted, builder.constant(placement.turn[chart].T.copy())))
-
-
-def _rows_of_patches(
-    builder: GraphBuilder, traced: _Traced, rows: _Rows, chart: int, patches: NDArray[np.int64], charts: int
-) -> list[tuple[int, _Rows]]:
-    """The rows of a chart, parted by the patch of the largest score."""
-    if len(patches) < 2 or traced.scores is None:
-        return [(int(patch), rows) for patch in patches]
-    scores = Lowering(traced.scores, builder, Value(rows.plane, 2), cut=cut_to_patch(chart, charts)).result(0)
-    own = builder.op("Slice", scores.name, *(builder.axes(i) for i in (0, len(patches), 1)))
-    winner = builder.op("ArgMax", own, axis=1, keepdims=0)
-    parted: list[tuple[int, _Rows]] = []
-    for column, patch in enumerate(patches):
-        mine = _rows_equal(builder, winner, column)
-        parted.append((int(patch), _Rows(*(builder.op("Gather", part, mine, axis=0) for part in rows))))
-    return parted
-
-
-def _in_source_units(builder: GraphBuilder, found: str, metadata: BundleMetadata) -> str:
-    """Positions and normals (r, 6) → points in source units and unit normals; WrapSession zeroes both centres."""
+def _points(builder: GraphBuilder, rows: tuple[str, ...], metadata: BundleMetadata) -> str:
+    """(n, 3) in source units; WrapSession zeroes both centres."""
     folded = fold_frame(metadata)
-    low, high, tiny = (builder.constant(np.asarray(bound, dtype=np.float32)) for bound in (-1.0, 1.0, 1e-12))
-    xyz = builder.op("Clip", builder.op("Slice", found, *(builder.axes(i) for i in (0, 3, 1))), low, high)
+    low, high = (builder.constant(np.asarray(bound, dtype=np.float32)) for bound in (-1.0, 1.0))
+    xyz = builder.op("Clip", _columns(builder, rows), low, high)
     away = builder.op("Mul", xyz, builder.named("scale", folded.scale))
     near = builder.op("Add", away, builder.named("centre_rest", folded.centre_rest))
-    points = builder.op("Add", near, builder.named("centre", folded.centre))
-    normal = builder.op("Slice", found, *(builder.axes(i) for i in (3, 6, 1)))
-    length = builder.op("Max", builder.op("ReduceL2", normal, builder.axes(1), keepdims=1), tiny)
-    return builder.op("Concat", points, builder.op("Div", normal, length), axis=1)
+    return builder.op("Add", near, builder.named("centre", folded.centre))
+
+
+def _normals(builder: GraphBuilder, rows: tuple[str, ...]) -> str:
+    """(n, 3) unit."""
+    normal = _columns(builder, rows)
+    length = builder.op("ReduceL2", normal, builder.axes(1), keepdims=1)
+    return builder.op("Div", normal, builder.op("Max", length, builder.constant(np.asarray(SHORTEST, np.float32))))
+
+
+def _columns(builder: GraphBuilder, rows: tuple[str, ...]) -> str:
+    """Rows (1, n) as columns (n, ·)."""
+    return builder.op("Transpose", builder.op("Concat", *rows, axis=0), perm=[1, 0])
+
+
+def probe_uv(atlas: Atlas, count: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Atlas uv (count, 2) float32 and their charts (count,): three of four inside charts, the others a little beside.
+
+    They visit the charts that have faces in turn, each face of a chart being as likely as the next.
+    """
+    rng = np.random.default_rng(seed)
+    by_chart = np.argsort(atlas.face_chart, kind="stable")
+    _, first, faces = np.unique(atlas.face_chart[by_chart], return_index=True, return_counts=True)
+    turn = np.arange(count) % len(faces)
+    face = by_chart[first[turn] + rng.integers(faces[turn])]
+    uv = np.einsum("nc,ncx->nx", rng.dirichlet(np.ones(3), size=count), atlas.corner_uv[face])
+    beside = rng.permutation(count) < count // 4
+    uv[beside] += rng.normal(scale=0.01, size=uv.shape)[beside]
+    return uv.clip(0.0, 1.0).astype(np.float32), atlas.face_chart[face]
+
+
+def prove_inverse(
+    inverse: Inverse, content: bytes, probes: tuple[NDArray[np.float32], NDArray[np.int64]], spec: WrapParitySpec
+) -> WrapParityReport:
+    """Compare the networks with the ONNX model ``content`` at the first n of the probes, n in spec.sizes.
+
+    Raises:
+        ParityError: names the output, n, max |Δ| and what was allowed; or most rows are ties and prove nothing.
+    """
+    session, folded, networks = load_model(content), fold_frame(inverse.metadata), inverse.networks
+    scale = float(folded.scale)
+    rounding = 4.0 * float(np.spacing(np.float32(float(np.abs(folded.centre).max()) + scale)))
+    allowed = (spec.points_atol * scale + rounding, spec.normals_atol)
+    compared = ties = 0
+    errors = [0.0, 0.0]
+    for n in spec.sizes:
+        uv, chart = probes[0][:n], probes[1][:n]
+        found = run_model(session, ("points", "normals"), {"uv": uv, "chart": chart})
+        seen = inverse.inputs(uv, chart)
+        clear = np.minimum(networks.route(seen)[1], networks.grid.margin(seen)) > spec.tie
+        for i, (name, truth) in enumerate(zip(("points", "normals"), inverse(uv, chart), strict=True)):
+            errors[i] = max(errors[i], largest_difference(name, found[i], truth, clear, n, allowed[i]))
+        compared, ties = compared + int(clear.sum()), ties + int((~clear).sum())
+    if ties > compared:
+        found_ties = f"{ties} of {compared + ties} probes are ties between gates"
+        raise ParityError(f"{found_ties}, expected under half; report these networks, nothing was written")
+    return WrapParityReport(tuple(spec.sizes), compared, ties, errors[0] / scale, errors[1])

@@ -87,17 +87,18 @@ def facts(models: Path) -> dict[str, tuple[int, dict[str, int]]]:
 
 @pytest.fixture
 def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
-    """Replaces training: one chart, the projection onto the xy plane, with networks that know nothing of it.
+    """Replaces training: one chart, the projection onto the xy plane.
 
     Returns the surfaces it was asked to train, for tests of what happens before and after training.
     """
-    torch = pytest.importorskip("torch")
+    pytest.importorskip("torch")
     import numpy as np
 
-    from flexpara.runtime.mesh import Charts, Frame
+    from flexpara.runtime.mesh import Charts, Frame, Surface
+    from flexpara.runtime.progress import Clock
     from flexpara.train import presets
-    from flexpara.train.config import NetConfig, TrainConfig
-    from flexpara.train.learn.networks import AtlasNetworks
+    from flexpara.train.config import TrainConfig
+    from flexpara.train.deploy.fit import fit_networks
     from flexpara.train.pipeline import Trained
 
     trained: list[Surface] = []
@@ -106,11 +107,13 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)
-        none = np.zeros(len(surface.faces), np.int64)
+        none, frame = np.zeros(len(surface.faces), np.int64), Frame.of(surface.vertices)
+        charts = Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",))
+        ball = Surface(frame.apply(surface.vertices), surface.faces)
         return Trained(
-            charts=Charts(none, surface.triangles[..., :2].copy(), none, np.zeros(1, np.int64), ("slim",)),
-            networks=AtlasNetworks(1, NetConfig(), generator=torch.Generator().manual_seed(0)),
-            frame=Frame.of(surface.vertices),
+            charts=charts,
+            networks=fit_networks(ball, charts, settings.fit, settings.seed, Clock()),
+            frame=frame,
             settings={"preset": "fast", **asdict(settings)},
             report={},
             paper=None,

@@ -7,21 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from .deploy.config import FitConfig, WrapConfig
+
 
 @dataclass(frozen=True)
 class NetConfig:
     """Sizes of the networks.  The paper uses width 512 throughout; 64 is a choice for CPUs, not compared."""
 
     width: int = 64
-    """Channels of the hidden layers of embedding, Unwrap- and Wrap-Nets."""
-    assign_width: int = 128
-    """Hidden channels of the deployed Assign-Net, which has to follow seams along mesh edges."""
-    assign_depth: int = 2
-    """Hidden layers of the deployed Assign-Net."""
-    octaves: int = 6
-    """Fourier octaves of the deployed Assign-Net's input."""
-    unwrap_octaves: int = 2
-    """Fourier octaves of the deployed Unwrap-Nets' input."""
+    """Channels of the hidden layers of embedding, Assign-, Unwrap- and Wrap-Nets."""
 
 
 @dataclass(frozen=True)
@@ -151,76 +145,6 @@ class FinishConfig:
 
 
 @dataclass(frozen=True)
-class PatchConfig:
-    """Dividing charts into patches that one smooth network can answer for."""
-
-    neighbours: int = 24
-    """Nearest samples looked at from each sample; the density of samples follows from it and from reach."""
-    reach: float = 0.08
-    """Greatest distance at which two samples are close."""
-    rings: int = 3
-    """Edges that a step may cross where distances along the piece are measured from face to face."""
-    stretch: float = 2.0
-    """uv distance per distance in space that counts as smooth."""
-    gap: float = 0.03
-    """uv distance beyond that which counts as a tear."""
-    largest: float = 0.5
-    """Area (unit ball) above which a patch is halved: one small network answers for so much to a texel."""
-    most: int = 24
-    """Patches a chart may have."""
-
-
-@dataclass(frozen=True)
-class FitConfig:
-    """Fitting the deployed networks to the finished charts."""
-
-    samples: int = 60000
-    """Surface samples the Unwrap-Nets are fitted to, and as many again for the Assign-Net."""
-    unwrap_steps: int = 400
-    """Optimizer steps of the Unwrap-Nets."""
-    unwrap_batch: int = 64
-    """Samples a step and patch."""
-    assign_steps: int = 600
-    """Optimizer steps of the Assign-Net."""
-    assign_batch: int = 1024
-    """Samples a step."""
-    seam_share: float = 0.6
-    """Share of the Assign-Net's samples that lie close to seams."""
-    seam_reach: float = 0.03
-    """Greatest distance of these from the seam."""
-    thin_reach: float = 0.06
-    """Distance within which the surface counts as close to itself."""
-    tolerance: float = 0.002
-    """uv error, as a share of √(total uv area), up to which another patch of the chart is a right answer too."""
-    rate: float = 1e-2
-    """Peak learning rate."""
-
-
-@dataclass(frozen=True)
-class WrapConfig:
-    """Fitting the inverse.
-
-    Chosen on bunny and suzanne, where twice the waves (256 → 512) cut the error by a half and a quarter at twice to
-    three times the cost; checked on eight meshes: rms 0.05 to 0.15 % of the radius.
-    """
-
-    samples: int = 60000
-    """Surface samples, shared evenly by the patches."""
-    fewest: int = 600
-    """Samples that a patch gets at least."""
-    waves: int = 384
-    """Sines of a Wrap-Net."""
-    assign_waves: int = 256
-    """Sines of an Assign-Net."""
-    band: float = 0.7
-    """Highest frequency, as a share of the one at which a patch of that area has as many modes as the net has sines."""
-    ridge: float = 1e-6
-    """Ridge, as a share of the mean square of a hidden unit over the samples."""
-    shared: float = 0.25
-    """A patch also learns from its neighbours' samples where the Assign-Net gives it at least this score of about 1."""
-
-
-@dataclass(frozen=True)
 class TrainConfig:
     """Everything that decides a result, together with the surface."""
 
@@ -232,6 +156,5 @@ class TrainConfig:
     start: StartConfig = field(default_factory=StartConfig)
     joint: JointConfig = field(default_factory=JointConfig)
     finish: FinishConfig = field(default_factory=FinishConfig)
-    patch: PatchConfig = field(default_factory=PatchConfig)
     fit: FitConfig = field(default_factory=FitConfig)
     wrap: WrapConfig = field(default_factory=WrapConfig)

@@ -1,6 +1,6 @@
 """From a surface to finished charts and the networks that answer for them.
 
-surface (source units) → unit ball → joint training → finishing → patches → fit.  Charts come back in source units.
+surface (source units) → unit ball → joint training → finishing → fit.  Charts come back in source units.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ import torch
 
 from ..runtime.mesh import Charts, Frame, Surface
 from .deploy.fit import fit_networks
-from .deploy.patches import split_into_patches
 from .finish.finish import Finished, finish
 from .learn.joint import train_jointly
-from .learn.networks import AtlasNetworks, MultiChartNetworks
+from .learn.networks import MultiChartNetworks
 from .sampling import sample_surface
 
 if TYPE_CHECKING:
@@ -26,21 +25,22 @@ if TYPE_CHECKING:
     from torch import nn
 
     from ..runtime.progress import Progress
-    from .config import PatchConfig, TrainConfig
+    from .config import TrainConfig
+    from .deploy.gated import GatedExperts
 
 
 @dataclass(frozen=True, eq=False)
 class Trained:
     """Result of training.
 
-    charts: valid, in source units.  networks: unit ball → logits (n, p) and chart uv (n, p, 2) in source units.
+    charts: valid, in source units.  networks: unit ball (n, 3) → chart uv (n, 2) in source units, chart, score.
     frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.  The sentences under
     "notes" of the report are shown to the user.
     paper: the networks of preset paper as they were trained: unit ball → logits (n, p), raw uv (n, p, 2); else None.
     """
 
     charts: Charts
-    networks: AtlasNetworks
+    networks: GatedExperts
     frame: Frame
     settings: dict[str, Any]
     report: dict[str, Any]
@@ -59,12 +59,12 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
     steps = config.joint.steps
     scorer = train_jointly(samples, config, config.seed, lambda step, loss: progress("train", step, steps, loss))
     finished = finish(ball, log_probability(scorer), config.charts, config.finish, in_turn(progress))
-    charts = as_charts(ball, finished, config.patch)
+    charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
-    networks = fit_networks(ball, charts, config.net, config.fit, config.seed, progress)
+    networks = fit_networks(ball, charts, config.fit, config.seed, progress)
     report = {
-        "patches": len(charts.patch_chart),
+        "experts": len(networks.label),
         "objective": finished.objective,
         "slit_length": sum(piece.slits for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
@@ -96,18 +96,12 @@ def log_probability(networks: MultiChartNetworks) -> Any:
     return evaluate
 
 
-def as_charts(surface: Surface, finished: Finished, config: PatchConfig) -> Charts:
-    """Finished pieces as Charts, divided into patches."""
-    count = len(surface.faces)
-    face_chart = np.zeros(count, dtype=np.int64)
-    face_patch = np.zeros(count, dtype=np.int64)
-    corner_uv = np.zeros((count, 3, 2))
-    patch_chart: list[int] = []
+def as_charts(surface: Surface, finished: Finished) -> Charts:
+    """Finished pieces as Charts; each chart is one patch."""
+    face_chart = np.zeros(len(surface.faces), dtype=np.int64)
+    corner_uv = np.zeros((len(surface.faces), 3, 2))
     for chart, piece in enumerate(finished.pieces):
         face_chart[piece.ids] = chart
         corner_uv[piece.ids] = piece.flat.uv[piece.flat.surface.faces]
-        patch = split_into_patches(piece, config)
-        face_patch[piece.ids] = patch + len(patch_chart)
-        patch_chart += [chart] * (int(patch.max()) + 1)
     methods = tuple(piece.method for piece in finished.pieces)
-    return Charts(face_chart, corner_uv, face_patch, np.array(patch_chart, dtype=np.int64), methods)
+    return Charts(face_chart, corner_uv, face_chart, np.arange(len(methods)), methods)

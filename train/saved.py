@@ -7,57 +7,63 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import safetensors
-import torch
 from safetensors import SafetensorError
-from safetensors import torch as safetensors_torch
+from safetensors import numpy as safetensors_numpy
 
 from ..runtime.errors import InputError, MissingFileError
 from ..runtime.mesh import Charts, Frame
-from .config import NetConfig
-from .learn.networks import AtlasNetworks
+from .deploy.gated import GatedExperts, Grid
 from .pipeline import Trained
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from torch import Tensor
+    from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset
 
-FORMAT = "flexpara-trained-1"
+FORMAT = "flexpara-trained-2"
 LARGEST = 1 << 33
 """Bytes of a file that is read."""
-WIDEST = 4096
-"""Channels of a layer that is read."""
-CHARTS = {
-    "face_chart": torch.int64,
-    "corner_uv": torch.float64,
-    "face_patch": torch.int64,
-    "patch_chart": torch.int64,
+CHARTS = {"face_chart": np.int64, "corner_uv": np.float64, "face_patch": np.int64, "patch_chart": np.int64}
+GRID = {"low": np.float32, "cell": np.float32, "shape": np.int64}
+NETWORKS = {
+    "start": np.int32,
+    "gates": np.float32,
+    "sides": np.int32,
+    "weights": np.float32,
+    "label": np.int64,
+    "centre": np.float32,
+    "radius": np.float32,
+    "share": np.float32,
 }
+
+Arrays = dict[str, "NDArray[Any]"]
 
 
 def to_bytes(trained: Trained, source_sha256: str) -> bytes:
     """The file's content.  source_sha256: of the mesh that was trained on."""
-    arrays = {name: np.array(getattr(trained.charts, name), order="C") for name in CHARTS}  # they may share memory
-    tensors = {f"charts.{name}": torch.from_numpy(array) for name, array in arrays.items()}
-    weights = trained.networks.state_dict()
-    tensors |= {f"networks.{name}": weight.contiguous() for name, weight in weights.items()}
+    networks, parts = trained.networks, Arrays()
+    for kind, names, owner in (
+        ("charts", CHARTS, trained.charts),
+        ("networks", NETWORKS, networks),
+        ("grid", GRID, networks.grid),
+    ):
+        parts |= {f"{kind}.{name}": np.array(getattr(owner, name), order="C") for name in names}
     facts = {
         "format": FORMAT,
         "source_sha256": source_sha256,
         "methods": list(trained.charts.method),
         "frame": {"centre": list(trained.frame.centre), "scale": trained.frame.scale},
-        "net": asdict(trained.networks.config),
+        "depth": networks.depth,
         "settings": trained.settings,
         "report": trained.report,
     }
-    return safetensors_torch.save(tensors, {"flexpara": json.dumps(facts, sort_keys=True, allow_nan=False)})
+    return safetensors_numpy.save(parts, {"flexpara": json.dumps(facts, sort_keys=True, allow_nan=False)})
 
 
 def read_trained(path: Path, asset: Asset) -> Trained:
@@ -72,9 +78,9 @@ def read_trained(path: Path, asset: Asset) -> Trained:
     if path.stat().st_size > LARGEST:
         raise InputError(f"{path} has {path.stat().st_size} bytes, expected at most {LARGEST}; train again")
     try:
-        with safetensors.safe_open(path, "pt") as file:
+        with safetensors.safe_open(path, "np") as file:
             facts = json.loads((file.metadata() or {}).get("flexpara", "null"))
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # no mapping
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # no mapping
     except (SafetensorError, ValueError, RecursionError, OSError) as error:
         raise _damaged(path, f"no safetensors file with our header ({type(error).__name__})") from error
     if not isinstance(facts, dict) or facts.get("format") != FORMAT:
@@ -82,11 +88,11 @@ def read_trained(path: Path, asset: Asset) -> Trained:
     if facts.get("source_sha256") != asset.sha256:
         raise InputError(f"{path} belongs to another mesh than {asset.stem}, expected the same file; pass that mesh")
     try:
-        charts = _charts(path, tensors, facts["methods"], len(asset.faces))
-        networks = _networks(path, tensors, NetConfig(**facts["net"]), len(charts.patch_chart))
+        charts = _charts(path, arrays, facts["methods"], len(asset.faces))
+        networks = _networks(path, arrays, int(facts["depth"]), len(charts.method))
         frame = Frame(tuple(map(float, facts["frame"]["centre"])), float(facts["frame"]["scale"]))  # pyright: ignore[reportArgumentType]
         settings, report = dict(facts["settings"]), dict(facts["report"])
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise _damaged(path, str(error)[:120]) from error
@@ -95,39 +101,56 @@ def read_trained(path: Path, asset: Asset) -> Trained:
     return Trained(charts, networks, frame, settings, report)
 
 
-def _charts(path: Path, tensors: dict[str, Tensor], methods: list[str], faces: int) -> Charts:
+def _read(path: Path, arrays: Arrays, kind: str, shapes: dict[str, tuple[int | None, ...]], types: Any) -> Arrays:
+    """Arrays of a kind, of the types and shapes expected (None: any length), finite."""
+    found = {name: arrays[f"{kind}.{name}"] for name in shapes}
+    for name, array in found.items():
+        fits = len(array.shape) == len(shapes[name]) and all(
+            wanted in (None, size) for size, wanted in zip(array.shape, shapes[name], strict=True)
+        )
+        if array.dtype != types[name] or not fits or not np.isfinite(array).all():
+            raise _damaged(path, f"{kind}.{name} is {array.dtype} {array.shape}, or not finite")
+    return found
+
+
+def _charts(path: Path, arrays: Arrays, methods: list[str], faces: int) -> Charts:
     """The charts, with every index in range."""
-    arrays = {name: tensors[f"charts.{name}"] for name in CHARTS}
-    patches = len(arrays["patch_chart"])
-    shapes = {"face_chart": (faces,), "corner_uv": (faces, 3, 2), "face_patch": (faces,), "patch_chart": (patches,)}
-    for name, array in arrays.items():
-        if array.dtype != CHARTS[name] or tuple(array.shape) != shapes[name]:
-            raise _damaged(path, f"{name} is {array.dtype} {tuple(array.shape)}")
-    limits = {"face_chart": len(methods), "patch_chart": len(methods), "face_patch": patches}
+    shapes = {"face_chart": (faces,), "corner_uv": (faces, 3, 2), "face_patch": (faces,), "patch_chart": (None,)}
+    found = _read(path, arrays, "charts", shapes, CHARTS)
+    limits = {"face_chart": len(methods), "patch_chart": len(methods), "face_patch": len(found["patch_chart"])}
     for name, limit in limits.items():
-        if not (arrays[name].min() >= 0 and arrays[name].max() < limit):
+        if not (found[name].min() >= 0 and found[name].max() < limit):
             raise _damaged(path, f"{name} leaves 0 to {limit - 1}")
-    if not torch.isfinite(arrays["corner_uv"]).all():
-        raise _damaged(path, "corner_uv is not finite")
-    plain = {name: array.numpy() for name, array in arrays.items()}
-    return Charts(**plain, method=tuple(map(str, methods)))
+    return Charts(**found, method=tuple(map(str, methods)))
 
 
-def _networks(path: Path, tensors: dict[str, Tensor], net: NetConfig, patches: int) -> AtlasNetworks:
-    """The networks, their sizes checked before anything is made of them."""
-    sizes = asdict(net)
-    if not all(isinstance(size, int) and 0 <= size <= WIDEST for size in sizes.values()):
-        raise _damaged(path, f"net is {sizes}")
-    weights = {
-        name.removeprefix("networks."): tensor for name, tensor in tensors.items() if name.startswith("networks.")
-    }
-    if sum(tensor.numel() for tensor in weights.values()) < patches * net.width * net.width:
-        raise _damaged(path, f"too few weights for {patches} patches")
-    networks = AtlasNetworks(patches, net, generator=torch.Generator().manual_seed(0))
-    networks.load_state_dict(weights)
-    if not all(torch.isfinite(weight).all() for weight in networks.state_dict().values()):
-        raise _damaged(path, "weights are not finite")
-    return networks.eval()
+def _networks(path: Path, arrays: Arrays, depth: int, charts: int) -> GatedExperts:
+    """The networks, with every code in range, and every way through the gates an end."""
+    found = _read(path, arrays, "grid", {"low": (3,), "cell": (3,), "shape": (3,)}, GRID)
+    grid = Grid(**found)
+    if not ((grid.cell > 0.0).all() and (grid.shape > 0).all() and grid.count < 1 << 24):
+        raise _damaged(path, f"grid of {grid.shape.tolist()} cells")
+    experts, gates = len(arrays["networks.label"]), len(arrays["networks.gates"])
+    shapes: dict[str, tuple[int | None, ...]] = {"start": (grid.count,), "gates": (gates, 4), "sides": (gates, 2)}
+    shapes |= {"weights": (experts, 2, 4), "centre": (experts, 3)}
+    shapes |= dict.fromkeys(("label", "radius", "share"), (experts,))
+    found = _read(path, arrays, "networks", shapes, NETWORKS)
+    codes, sides = np.append(found["start"], found["sides"]), found["sides"]
+    forward = (sides > np.arange(gates)[:, None]).all()  # a gate leads to later gates and to experts: no way is endless
+    if experts == 0 or codes.min() < 0 or codes.max() >= gates + experts or not forward or depth != _depth(sides):
+        raise _damaged(path, f"{gates} gates, {experts} experts, and codes that don't lead from these to those")
+    if not (found["label"].min() >= 0 and found["label"].max() < charts):
+        raise _damaged(path, f"networks.label leaves 0 to {charts - 1}")
+    return GatedExperts(grid=grid, depth=depth, **found)
+
+
+def _depth(sides: NDArray[np.int32]) -> int:
+    """The most gates on any way: each gate's code is larger than those before it."""
+    below = np.zeros(len(sides), dtype=np.int64)
+    for gate in range(len(sides) - 1, -1, -1):
+        later = sides[gate][sides[gate] < len(sides)]
+        below[gate] = 1 + (below[later].max() if len(later) else 0)
+    return int(below.max(initial=0))
 
 
 def _damaged(path: Path, found: str) -> InputError:

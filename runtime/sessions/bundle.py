@@ -28,7 +28,7 @@ CONVENTIONS = {
     "points": "float32 (n, 3), units of the source file, on or near its surface",
     "uv": "float32 (n, 2), atlas coordinates in [0, 1], origin bottom left, v up",
     "chart": "int64 (n), index into placement",
-    "score": "float32 (n), probability of the chart in [0, 1]",
+    "score": "float32 (n), in [0, 1]: how far chart and uv can be trusted",
     "placement": "rows of (2, 3): atlas uv = placement[:, :2] @ chart uv + placement[:, 2]",
     "frame": "the networks see (points - centre) / scale",
 }

@@ -25,6 +25,7 @@ from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNot
 
 from ..errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from .bundle import METADATA_KEY, BundleMetadata
+from .chunks import checked_chunk, checked_threads, fill_in_chunks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,8 +46,9 @@ _REMEDY = "pass the .onnx file that flexpara unwrap wrote"
 class Unwrapped(NamedTuple):
     """Where n points lie in the atlas.
 
-    uv: (n, 2) float32 in [0, 1], v up.  chart: (n,) int64 in [0, chart_count).  score: (n,) float32 in [0, 1], the
-    probability of that chart; low near seams and far from the surface.
+    uv: (n, 2) float32 in [0, 1], v up.  chart: (n,) int64 in [0, chart_count).  score: (n,) float32 in [0, 1], how far
+    chart and uv can be trusted: the share of right answers that was measured around the point when the map was fitted,
+    1 but where parts of the surface touch; falling with the square of the distance where no surface is near.
     """
 
     uv: NDArray[np.float32]
@@ -86,7 +88,6 @@ class Opened(NamedTuple):
 def open_bundle(
     path: Path,
     providers: Sequence[str],
-    threads: int | None,
     inputs: Mapping[str, str],
     outputs: Mapping[str, str],
 ) -> Opened:
@@ -94,12 +95,10 @@ def open_bundle(
 
     Raises: as UnwrapSession.
     """
-    if threads is not None and threads < 1:
-        raise InputError(f"threads = {threads}, expected at least 1; leave it out for the default")
     _check_file(path)
     _check_available(providers)
     zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
-    session = _load(path, providers, threads, dict.fromkeys(CENTRES, zero))
+    session = _load(path, providers, dict.fromkeys(CENTRES, zero))
     metadata = _read_metadata(session, path)
     _check_signature(session, path, inputs, outputs)
     _check_used(session, providers)
@@ -123,7 +122,7 @@ class UnwrapSession:
             path: an .onnx file that flexpara wrote.
             providers: onnxruntime execution providers, best first; all must really be used, there is no fallback.
             chunk: points a run; what is in flight then stays in the processor's caches.
-            threads: of one run; None = one a core.
+            threads: that answer a chunk each; None = one a core.
 
         Raises:
             MissingFileError: nothing lies at path.
@@ -131,8 +130,8 @@ class UnwrapSession:
             MissingDependencyError: a provider is not in this build of onnxruntime or can't start here.
             InputError: chunk or threads below 1.
         """
-        self._chunk = checked_chunk(chunk)
-        self._opened = open_bundle(Path(path), providers, threads, INPUTS, OUTPUTS)
+        self._chunk, self._threads = checked_chunk(chunk), checked_threads(threads)
+        self._opened = open_bundle(Path(path), providers, INPUTS, OUTPUTS)
 
     @property
     def metadata(self) -> BundleMetadata:
@@ -162,10 +161,7 @@ class UnwrapSession:
             chart=np.zeros(n, dtype=np.int64),
             score=np.zeros(n, dtype=np.float32),
         )
-        for start in range(0, n, self._chunk):
-            rows = slice(start, start + self._chunk)
-            for target, found in zip(answer, self._run(points[rows], start), strict=True):
-                target[rows] = found
+        fill_in_chunks(answer, lambda rows: self._run(points[rows], rows.start), self._chunk, self._threads)
         return answer
 
     def _run(self, points: Points, start: int) -> list[NDArray[np.generic]]:
@@ -179,13 +175,6 @@ class UnwrapSession:
             expected = f"points near the surface (centre {frame.centre}, radius {frame.scale:.6g})"
             raise InputError(f"{found}, expected {expected}; use the units and the placement of the source file")
         return self._opened.run(list(OUTPUTS), {"points": centred.astype(np.float32)})
-
-
-def checked_chunk(chunk: int) -> int:
-    """Rows a run.  Raises: InputError below 1."""
-    if chunk < 1:
-        raise InputError(f"chunk = {chunk}, expected at least 1; leave it out for the default")
-    return chunk
 
 
 def _check_file(path: Path) -> None:
@@ -212,13 +201,12 @@ def _check_available(providers: Sequence[str]) -> None:
 
 
 def _load(
-    path: Path, providers: Sequence[str], threads: int | None, replaced: Mapping[str, onnxruntime.OrtValue]
+    path: Path, providers: Sequence[str], replaced: Mapping[str, onnxruntime.OrtValue]
 ) -> onnxruntime.InferenceSession:
     """The model with some initializers replaced; the caller keeps those alive."""
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
-    if threads is not None:
-        options.intra_op_num_threads = threads
+    options.intra_op_num_threads = 1  # chunks are shared out, see chunks.py
     for name, value in replaced.items():
         options.add_initializer(name, value)
     try:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..errors import BundleError, InputError, ShapeError
 from .bundle import METADATA_KEY, BundleMetadata
-from .session import checked_chunk, open_bundle
+from .chunks import checked_chunk, checked_threads, fill_in_chunks
+from .session import open_bundle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,7 +68,7 @@ class WrapSession:
             path: a .wrap.onnx file that flexpara wrote.
             providers: onnxruntime execution providers, best first; all must really be used, there is no fallback.
             chunk: rows a run.
-            threads: of one run; None = one a core.
+            threads: that answer a chunk each; None = one a core.
 
         Raises:
             MissingFileError: nothing lies at path.
@@ -75,8 +76,8 @@ class WrapSession:
             MissingDependencyError: a provider is not in this build of onnxruntime or can't start here.
             InputError: chunk or threads below 1.
         """
-        self._chunk = checked_chunk(chunk)
-        self._opened = open_bundle(Path(path), providers, threads, INPUTS, OUTPUTS)
+        self._chunk, self._threads = checked_chunk(chunk), checked_threads(threads)
+        self._opened = open_bundle(Path(path), providers, INPUTS, OUTPUTS)
         _check_kind(self._opened.session.get_modelmeta().custom_metadata_map[METADATA_KEY], Path(path))
 
     @property
@@ -104,11 +105,12 @@ class WrapSession:
         uv, chart = _checked_uv(uv), _checked_chart(chart, len(uv), self.chart_count)
         n, frame = len(uv), self.metadata.frame
         answer = Wrapped(np.zeros((n, 3)), np.zeros((n, 3), dtype=np.float32))
-        for start in range(0, n, self._chunk):
-            rows = slice(start, start + self._chunk)
+
+        def run(rows: slice) -> Sequence[NDArray[np.generic]]:
             feed = {"uv": uv[rows].astype(np.float32), "chart": chart[rows].astype(np.int64)}
-            for target, part in zip(answer, self._opened.run(list(OUTPUTS), feed), strict=True):
-                target[rows] = part
+            return self._opened.run(list(OUTPUTS), feed)
+
+        fill_in_chunks(answer, run, self._chunk, self._threads)
         return answer._replace(points=answer.points + np.asarray(frame.centre))
 
 

@@ -12,7 +12,7 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from flexpara.export.graph import UnwrapGraph
+from flexpara.export.graph import UnwrapGraph, truth_of
 from flexpara.export.onnx import ExportSpec, build_model
 from flexpara.export.parity import ParityReport, ParitySpec, probe_points, prove_parity
 from flexpara.runtime.errors import ParityError
@@ -21,8 +21,8 @@ MapMaker = Callable[..., Any]
 
 
 def prove(made: Any, content: bytes, spec: ParitySpec | None = None) -> ParityReport:
-    points = made.probes(1000)
-    return prove_parity(UnwrapGraph(made.model, made.metadata), content, points, spec or ParitySpec())
+    spec = spec or ParitySpec()
+    return prove_parity(truth_of(UnwrapGraph(made.model, made.metadata), spec.tie), content, made.probes(1000), spec)
 
 
 def changed(content: bytes, name: str, change: Callable[[np.ndarray], np.ndarray]) -> bytes:

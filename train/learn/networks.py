@@ -94,26 +94,6 @@ def silu_jet(x: Tensor) -> Tensor:
     return torch.cat([value * sigmoid, slope * tangents])
 
 
-class FourierFeatures(nn.Module):
-    """xyz → (xyz, sin 2^i π Bxyz, cos 2^i π Bxyz) for ``octaves`` i; octaves = 0 passes xyz through."""
-
-    def __init__(self, octaves: int) -> None:
-        super().__init__()
-        self.octaves = octaves
-
-    @property
-    def channels(self) -> int:
-        """Number of output channels."""
-        return 3 + 6 * self.octaves
-
-    def forward(self, xyz: Tensor) -> Tensor:
-        """(…, n, 3) → (…, n, channels)."""
-        if self.octaves == 0:
-            return xyz
-        phase = torch.cat([xyz * (math.pi * 2.0**i) for i in range(self.octaves)], dim=-1)
-        return torch.cat([xyz, torch.sin(phase), torch.cos(phase)], dim=-1)
-
-
 class Cycle(NamedTuple):
     """What the 3D → 2D → 3D cycle yields for n points and p patches.
 
@@ -149,29 +129,3 @@ class MultiChartNetworks(nn.Module):
         uv, tangents = torch.split(self.unwrap.jet(feature[:, None]), [1, 2])
         position, normal = torch.split(self.wrap(uv[0]), 3, dim=-1)
         return Cycle(self.assign(feature.unbind()[0]), uv[0], tangents, position, normal)
-
-
-class AtlasNetworks(nn.Module):
-    """What ships: Assign-Net and p Unwrap-Nets fitted to the finished charts.
-
-    forward: xyz (n, 3) in the unit ball → logits (n, p), uv (n, p, 2) in chart coordinates.
-    """
-
-    def __init__(self, patches: int, config: NetConfig, *, generator: torch.Generator) -> None:
-        super().__init__()
-        self.config = config
-        self.features = FourierFeatures(config.octaves)
-        self.unwrap_features = FourierFeatures(config.unwrap_octaves)
-        wide, width = config.assign_width, config.width
-        self.assign = Perceptron((self.features.channels, *(wide,) * config.assign_depth, patches), generator=generator)
-        self.unwrap = Perceptron(
-            (self.unwrap_features.channels, width, width, width, 2), copies=patches, generator=generator
-        )
-
-    def scores(self, xyz: Tensor) -> Tensor:
-        """Logits of the Assign-Net: (n, 3) → (n, p)."""
-        return self.assign(self.features(xyz))
-
-    def forward(self, xyz: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (n, p) and the uv of every patch (n, p, 2)."""
-        return self.scores(xyz), self.unwrap(self.unwrap_features(xyz)).transpose(0, 1)

@@ -1,7 +1,7 @@
 """Preset ``paper``, from a surface to finished charts: the paper's training, its raw figures, then valid charts.
 
 n points · f faces · v vertices · p charts.
-surface (source units) → unit ball → train_paper → raw figures → finishing → patches → fit.
+surface (source units) → unit ball → train_paper → raw figures → finishing → fit.
 The raw figures are those of the networks' own map, as the paper measures it; the finished ones are those of the charts
 that come back, in source units.
 """
@@ -73,10 +73,10 @@ def train_paper_surface(
     steps, finishing = config.steps, GlobalFinishConfig(finish=deploy.finish)
     paper = train_paper(samples, config, lambda step, loss: progress("train", step, steps, loss), checkpoints)
     finished, report = finish_learned(ball, as_numpy(paper), config, in_turn(progress), finishing)
-    charts = as_charts(ball, finished, deploy.patch)
+    charts = as_charts(ball, finished)
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
     report["finished"] = finished_figures(surface, charts, finished)
-    networks = fit_networks(ball, charts, deploy.net, deploy.fit, config.seed, progress)
+    networks = fit_networks(ball, charts, deploy.fit, config.seed, progress)
     settings = {"preset": "paper", **asdict(config), "deploy": asdict(deploy)}
     if config.mode == "global":
         settings["global_finish"] = {name: part for name, part in asdict(finishing).items() if name != "finish"}

@@ -20,6 +20,7 @@ from flexpara.runtime.samples import make_sample
 from flexpara.train.cloud.reconstruct import assembled, reconstruct, without_pinches
 from flexpara.train.cloud.stars import Candidates
 from flexpara.train.config import FinishConfig, FitConfig, JointConfig, StartConfig, TrainConfig
+from flexpara.train.deploy.config import SampleConfig
 from flexpara.train.pipeline import train
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ QUICK = TrainConfig(
     start=StartConfig(samples=2000, fit_steps=30),
     joint=JointConfig(steps=10),
     finish=FinishConfig(surrogate_faces=800, rounds=1),
-    fit=FitConfig(samples=1000, unwrap_steps=1, assign_steps=1),  # the networks play no part here
+    fit=FitConfig(samples=SampleConfig(per_face=1, least=1000, beside=500)),  # the networks play no part here
 )
 
 

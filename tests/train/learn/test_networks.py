@@ -10,9 +10,7 @@ import torch
 
 from flexpara.train.config import NetConfig
 from flexpara.train.learn.networks import (
-    AtlasNetworks,
     Dense,
-    FourierFeatures,
     MultiChartNetworks,
     Perceptron,
     silu_jet,
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
 # torch.func.jvp scripts its decompositions, which torch itself calls deprecated.
 pytestmark = pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")
 
-SMALL = NetConfig(width=8, assign_width=12, assign_depth=2, octaves=3, unwrap_octaves=1)
+SMALL = NetConfig(width=8)
 
 
 def seeded(seed: int = 0) -> torch.Generator:
@@ -119,32 +117,6 @@ def test_copies_take_one_input_for_all_or_one_each() -> None:
     torch.testing.assert_close(net(own)[2], net(own[2])[2])
 
 
-def test_no_octaves_pass_points_through() -> None:
-    x = points(5)
-    assert torch.equal(FourierFeatures(0)(x), x)
-    assert FourierFeatures(0).channels == 3
-
-
-def test_fourier_features_are_sines_and_cosines_of_octaves() -> None:
-    x = torch.tensor([[0.5, 0.25, 0.0]])
-    root = math.sqrt(0.5)
-    expected = [0.5, 0.25, 0.0, 1.0, root, 0.0, 0.0, 1.0, 0.0, 0.0, root, 1.0, -1.0, 0.0, 1.0]
-    torch.testing.assert_close(FourierFeatures(2)(x)[0], torch.tensor(expected), rtol=0.0, atol=1e-6)
-
-
-def test_each_octave_is_the_first_at_twice_the_frequency() -> None:
-    x, features = points(5), FourierFeatures(4)
-    sine, first = features(x)[:, 3:15].reshape(5, 4, 3), FourierFeatures(1)
-    for i in range(4):
-        torch.testing.assert_close(sine[:, i], first(2.0**i * x)[:, 3:6], rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("octaves", [0, 1, 4])
-def test_fourier_channels_are_what_comes_out(octaves: int) -> None:
-    features = FourierFeatures(octaves)
-    assert features(torch.zeros(2, 7, 3)).shape == (2, 7, features.channels)
-
-
 def test_the_cycle_has_the_shapes_it_says() -> None:
     networks = MultiChartNetworks(5, SMALL, generator=seeded())
     cycle = networks(torch.zeros(7, 3), torch.zeros(2, 7, 3))
@@ -169,35 +141,11 @@ def test_the_cycle_carries_the_derivatives_of_uv_along_the_tangents() -> None:
     torch.testing.assert_close(torch.cat([cycle.xyz, cycle.normal], dim=-1), wrapped, rtol=0.0, atol=1e-13)
 
 
-def test_the_deployed_networks_have_the_shapes_they_say() -> None:
-    networks = AtlasNetworks(5, SMALL, generator=seeded())
-    logits, uv = networks(torch.zeros(7, 3))
-    assert logits.shape == (7, 5)
-    assert uv.shape == (7, 5, 2)
-    assert len(networks.assign.layers) == SMALL.assign_depth + 1
-
-
-@pytest.mark.parametrize("count", [0, 1])
-def test_the_deployed_networks_take_no_point_and_one(count: int) -> None:
-    logits, uv = AtlasNetworks(2, SMALL, generator=seeded())(torch.zeros(count, 3))
-    assert logits.shape == (count, 2)
-    assert uv.shape == (count, 2, 2)
-
-
-def test_a_point_gets_the_same_answer_alone_and_among_others() -> None:
-    networks = AtlasNetworks(3, SMALL, generator=seeded()).double()
-    x = points(8)
-    logits, uv = networks(x)
-    torch.testing.assert_close(networks(x[5:6])[0][0], logits[5], rtol=0.0, atol=1e-13)
-    torch.testing.assert_close(networks(x[5:6])[1][0], uv[5], rtol=0.0, atol=1e-13)
-
-
-@pytest.mark.parametrize("kind", [MultiChartNetworks, AtlasNetworks])
-def test_the_generator_alone_decides_the_weights(kind: type[MultiChartNetworks] | type[AtlasNetworks]) -> None:
-    first = kind(3, SMALL, generator=seeded(4)).state_dict()
+def test_the_generator_alone_decides_the_weights() -> None:
+    first = MultiChartNetworks(3, SMALL, generator=seeded(4)).state_dict()
     torch.manual_seed(99)
     torch.rand(10)
-    again, other = (kind(3, SMALL, generator=seeded(seed)).state_dict() for seed in (4, 5))
+    again, other = (MultiChartNetworks(3, SMALL, generator=seeded(seed)).state_dict() for seed in (4, 5))
     assert all(torch.equal(first[name], again[name]) for name in first)
     assert not all(torch.equal(first[name], other[name]) for name in first)
 

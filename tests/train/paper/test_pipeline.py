@@ -13,6 +13,7 @@ from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Charts, Frame, Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FitConfig, TrainConfig
+from flexpara.train.deploy.config import SampleConfig
 from flexpara.train.paper.config import PaperConfig, PaperNets
 from flexpara.train.paper.finishing import GlobalFinishConfig
 from flexpara.train.paper.pipeline import (
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     Learned = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 SMALL = PaperNets(hidden=16, embedding=8)
-DEPLOY = TrainConfig(fit=FitConfig(samples=4000, unwrap_steps=20, assign_steps=20))
+DEPLOY = TrainConfig(fit=FitConfig(samples=SampleConfig(per_face=1, least=4000, beside=2000)))
 
 
 def quiet(stage: str) -> None:
@@ -192,7 +193,7 @@ def test_hardly_trained_networks_still_give_valid_charts_in_source_units(mode: s
     )
     result = train_paper_surface(torus, config, note, deploy=DEPLOY)
     assert stages[0] == "train"
-    assert list(dict.fromkeys(stages))[-2:] == ["fit uv", "fit charts"]
+    assert stages[-1] == "fit"
     charts = result.charts
     metrics = measure(torus, side_by_side(charts), charts.face_chart)
     assert (metrics.flipped_faces, metrics.overlap_fraction) == (0, 0.0)
@@ -203,6 +204,6 @@ def test_hardly_trained_networks_still_give_valid_charts_in_source_units(mode: s
     assert json.loads(json.dumps(result.report))["finished"]["charts"] == metrics.charts
     assert json.loads(json.dumps(result.settings))["mode"] == mode
     assert set(result.report) >= {"raw", "finished"}
-    logits, uv = result.networks(torch.zeros(2, 3))
-    assert logits.shape == (2, len(charts.patch_chart))
-    assert uv.shape == (2, len(charts.patch_chart), 2)
+    corner = result.frame.apply(torus.triangles[:, 0]).astype(np.float32)
+    gap = np.linalg.norm(result.networks(corner).value - charts.corner_uv[:, 0], axis=1)
+    assert np.median(gap) < 1e-2 * np.sqrt(area)
