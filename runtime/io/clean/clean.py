@@ -18,7 +18,7 @@ from ...mesh import Asset, Surface
 from ..rawmesh import RawMesh, check, with_vertices
 from .orient import connected_labels, face_edges, inconsistent_faces
 from .sheets import separate_sheets, twins
-from .weld import degenerate_faces, longest_edges, weld_vertices
+from .weld import degenerate_faces, weld_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
     check(raw)
     used, faces = np.unique(raw.faces, return_inverse=True)
     part = with_vertices(raw, used, faces.reshape(-1, 3))
-    weld = weld_vertices(part.positions, longest_edges(part.positions, part.faces))
+    weld = weld_vertices(part.positions, part.faces)
     proper = ~degenerate_faces(part.positions[first_of_each(weld)], weld[part.faces])
     if not proper.any():
         raise MeshError(
@@ -40,8 +40,9 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
         )
     kept = np.flatnonzero(proper)
     welded = np.unique(weld[part.faces[kept]], return_inverse=True)[1].reshape(-1, 3)
-    lies_on = np.bincount(twins(welded))[twins(welded)] > 1
-    sheets, _ = separate_sheets(welded)
+    twin = twins(welded)
+    lies_on = np.bincount(twin)[twin] > 1
+    sheets = separate_sheets(welded, twin)[0] if lies_on.any() else welded
     flip = inconsistent_faces(sheets)
     counts = {
         "unreferenced_vertices": len(raw.positions) - len(np.unique(part.faces[kept])),

@@ -29,17 +29,18 @@ def twins(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return equal_rows(np.sort(faces, axis=1))
 
 
-def separate_sheets(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def separate_sheets(faces: NDArray[np.int64], group: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Give faces that lie on each other vertices of their own.
 
     Args:
         faces: (f, 3) int64 welded vertices 0 … v − 1, each used, no corner repeated in a face.
+        group: (f,) int64, the label that `twins` gives them.
 
     Returns:
         (f, 3) int64 faces into the vertices after the split, and (v', ) int64, v' ≥ v, the welded vertex of each; the
         first v are those given.
     """
-    count, group = int(faces.max()) + 1, twins(faces)
+    count = int(faces.max()) + 1
     has_twin = np.bincount(group)[group] > 1
     if not has_twin.any():
         return faces, np.arange(count)

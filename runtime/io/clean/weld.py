@@ -28,14 +28,15 @@ SMALLEST_DIAGONAL = 1e-100
 """Below, areas leave the range of float64."""
 
 
-def weld_vertices(positions: NDArray[np.float64], reach: NDArray[np.float64] | None = None) -> NDArray[np.int64]:
+def weld_vertices(positions: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """Which vertices are one: equal positions, or a chain of them that are very near.
 
-    Very near is closer than WELD_TOLERANCE × bounding-box diagonal, and than WELD_SHARE × what either of them reaches.
+    Very near is closer than WELD_TOLERANCE × bounding-box diagonal, and than WELD_SHARE × the longest edge around
+    either of them.
 
     Args:
         positions: (n, 3) float64, finite.
-        reach: (n,) float64, the longest edge around each vertex; None sets no limit.
+        faces: (f, 3) int64, whose edges set that limit; None sets none.
 
     Returns:
         (n,) int64 in [0, v), numbered by first appearance: the welded vertex of each file vertex.
@@ -52,9 +53,8 @@ def weld_vertices(positions: NDArray[np.float64], reach: NDArray[np.float64] | N
     group = equal_rows(positions)
     distinct = positions[first_of_each(group)]
     pairs = KDTree(distinct).query_pairs(WELD_TOLERANCE * diagonal, output_type="ndarray")
-    if len(pairs) and reach is not None:
-        farthest = np.zeros(len(distinct))
-        np.maximum.at(farthest, group, reach)
+    if len(pairs) and faces is not None:
+        farthest = longest_edges(distinct, group[faces])
         apart = np.linalg.norm(distinct[pairs[:, 0]] - distinct[pairs[:, 1]], axis=1)
         pairs = pairs[apart <= WELD_SHARE * farthest[pairs].min(axis=1)]
     if len(pairs):

@@ -226,6 +226,14 @@ def _uv(file_uv: NDArray[np.float64], width: NDArray[np.int64], index: NDArray[n
     return table[index]
 
 
+def _libraries(lines: _Lines, read_sibling: Callable[[str], bytes | None]) -> list[str]:
+    """Names of material libraries: a line is one name with spaces in it where such a file is there, else several."""
+    names: list[str] = []
+    for line in lines.text["mtllib"]:
+        names += [line] if read_sibling(line) is not None else line.split()
+    return list(dict.fromkeys(names))
+
+
 def _materials(
     lines: _Lines,
     at_line: NDArray[np.int64],
@@ -236,7 +244,7 @@ def _materials(
     if not lines.text["usemtl"]:
         return (), None
     known: dict[str, Material] = {}
-    for name in lines.text["mtllib"]:
+    for name in _libraries(lines, read_sibling):
         found = read_sibling(name)
         changes["missing_materials"] = changes.get("missing_materials", 0) + (found is None)
         if found is not None:

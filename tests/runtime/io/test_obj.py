@@ -208,3 +208,10 @@ def test_uv_of_one_number_have_v_0() -> None:
     raw = read(f"{SQUARE}vt 0.25\nvt 0.5 0.75\nf 1/1 2/2 3/2\n")
     assert raw.uv is not None
     np.testing.assert_array_equal(raw.uv[raw.faces[0]], [[0.25, 0], [0.5, 0.75], [0.5, 0.75]])
+
+
+def test_a_line_may_name_several_material_libraries() -> None:
+    files = {"a.mtl": b"newmtl one\nKd 1 0 0\n", "b.mtl": b"newmtl two\nKd 0 1 0\n"}
+    raw = read(f"mtllib a.mtl b.mtl\n{SQUARE}usemtl one\nf 1 2 3\nusemtl two\nf 1 3 4\n", files.get)
+    assert [material.base_color_factor[:2] for material in raw.materials] == [(1, 0), (0, 1)]
+    assert not nonzero(raw)

@@ -13,7 +13,7 @@ from flexpara.runtime.samples import make_sample
 def apart(faces: list[list[int]] | np.ndarray) -> np.ndarray:
     """The faces after the split; every vertex stays where it was."""
     given = np.asarray(faces, dtype=np.int64)
-    result, source = separate_sheets(given)
+    result, source = separate_sheets(given, twins(given))
     np.testing.assert_array_equal(source[result], given)
     assert source[: given.max() + 1].tolist() == list(range(given.max() + 1))
     return result
