@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..runtime.errors import InputError
+from ..runtime.options import from_keywords
 from .closing import ClosingConfig, closed_seams
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone
@@ -19,57 +20,45 @@ from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
 from .raster.plan import Plan, open_rasterizer
 from .seams import agrees_across_seams, find_seams, sample_seams, seam_error
+from .settings import BakeSettings
 from .texture import Texture
 from .windows import background_of, blank_gbuffer, computed, map_windows, put_together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
     from .bakemap import BakeMap, NormalFormat
-    from .raster.plan import Device
 
 
 def bake(
     atlas: Atlas,
     asset: Asset | Mapping[str, SurfaceFunction],
     maps: Sequence[str | BakeMap] | Mapping[str, SurfaceFunction] | None = None,
+    settings: BakeSettings | None = None,
     *,
-    size: int | None = None,
-    padding: int | None = None,
-    samples: int = 1,
-    normal_format: NormalFormat = "opengl",
-    device: Device = "auto",
-    limit: int | None = None,
-    tile: tuple[int, int] | None = None,
-    scratch: Path | None = None,
     progress: Callable[[str], None] | None = None,
     warn: Callable[[str], None] | None = None,
+    **keywords: Any,
 ) -> dict[str, Texture]:
-    """Bake maps of an atlas, or functions of its surface: `bake(atlas, {"mymap": f})`.
+    """Bake maps of an atlas, or functions of its surface: `bake(atlas, {"mymap": f}, size=1024)`.
 
     Args:
         atlas: what is drawn; its faces are those of `asset`, in the same order.
         asset: source of colours, normals and textures; may be left out where maps are functions.
-        maps: names (see `maps.MAP_NAMES`) or maps of one's own; the order is kept.  Or name → function of positions
-            (t, 3), unit normals (t, 3), both float32, and face numbers (t,) int64, which returns (t,) or (t, 1 to 4).
-        size: texels per side; the atlas' own unless given.
-        padding: texels of gutter around the charts; None fills the whole image.
-        samples: 1, 4 or 16 per texel.
-        normal_format: green channel of the tangent-space normal map, opengl (+Y) or directx (−Y).
-        device: "auto", "opengl" or "software", see `tiles.open_rasterizer`.
-        limit: the largest side drawn at once, in samples; what the device allows unless given.
-        tile: the UDIM tile (a, b) to draw, see `udim.py`.
-        scratch: a folder on whose disk the images are kept, in files without a name, instead of in memory: for 16k.
+        maps: names (see `catalogue.MAP_NAMES`) or maps of one's own; the order is kept.  Or name → function of
+            positions (t, 3), unit normals (t, 3), both float32, and face numbers (t,) int64, which returns (t,) or
+            (t, 1 to 4).
+        settings: see `BakeSettings`; None is its defaults.
         progress: called with each map's name before it is made.
         warn: called with one line when OpenGL cannot be had and numpy draws instead.
+        **keywords: fields of `BakeSettings`, in place of those of settings: size=1024, padding=8, …
 
     Returns: name → Texture, linear float32 pixels (size, size, c).
 
-    Raises: InputError for an unknown map, a size or uv that cannot be drawn, a map that lacks its source;
+    Raises: InputError for an unknown map or keyword, a size or uv that cannot be drawn, a map that lacks its source;
         MissingDependencyError when "opengl" is asked for and cannot be had.
     """
     if isinstance(asset, Mapping):
@@ -78,22 +67,23 @@ def bake(
                 "two collections of maps, expected one; pass bake(atlas, functions) or (atlas, asset, maps)"
             )
         atlas, asset, maps = replace(atlas, source_vertex=np.arange(len(atlas.positions))), surface_alone(atlas), asset
-    chosen = find_maps(maps or (), normal_format=normal_format)
+    settings = from_keywords(BakeSettings, settings, keywords)
+    chosen = find_maps(maps or (), normal_format=settings.normal_format)
     if not chosen:
         return {}
-    texels = atlas.size if size is None else size
+    texels = atlas.size if settings.size is None else settings.size
     check_size(texels)
-    check_padding(padding)
-    plan = Plan(texels, samples, limit, tile)
+    check_padding(settings.padding)
+    plan = Plan(texels, settings.samples, settings.limit, settings.tile)
     drawn = [entry for entry in chosen if not entry.everywhere]
     pixels: dict[str, NDArray[np.float32]] = {}
     if drawn:
-        with open_rasterizer(atlas, plan, device=device, warn=warn) as (rasterizer, pieces):
+        with open_rasterizer(atlas, plan, device=settings.device, warn=warn) as (rasterizer, pieces):
             baked = map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress)
-            pixels, covered, inside = put_together(baked, texels, scratch)
+            pixels, covered, inside = put_together(baked, texels, settings.scratch)
         images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in drawn]
-        fill_gutters(images, covered, padding)
-        if padding != 0 and tile is None:
+        fill_gutters(images, covered, settings.padding)
+        if settings.padding != 0 and settings.tile is None:
             close_seams(atlas, drawn, pixels, inside)
     for entry in (entry for entry in chosen if entry.everywhere):
         _announce(progress, entry.name)

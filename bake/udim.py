@@ -6,14 +6,17 @@ named NAME.1001.png, and programs find them by NAME.<UDIM>.png.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..runtime.errors import InputError
+from ..runtime.options import from_keywords
 from .baker import bake
 from .files.images import write_texture
 from .files.textures import texture_names
+from .settings import BakeSettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,13 +62,14 @@ def tile_of(number: int) -> tuple[int, int]:
 
 
 def bake_udim(
-    atlas: Atlas, asset: Asset, maps: Sequence[str | BakeMap], **options: Any
+    atlas: Atlas, asset: Asset, maps: Sequence[str | BakeMap], settings: BakeSettings | None = None, **keywords: Any
 ) -> dict[int, dict[str, Texture]]:
-    """Tile number → name → Texture, as `baker.bake` with the same options, one call for each tile.
+    """Tile number → name → Texture, as `baker.bake` with the same settings, one call for each tile.
 
     Raises: as `udim_tiles` and `baker.bake`.
     """
-    return {number: bake(atlas, asset, maps, tile=tile_of(number), **options) for number in udim_tiles(atlas)}
+    made = from_keywords(BakeSettings, settings, keywords)
+    return {number: bake(atlas, asset, maps, replace(made, tile=tile_of(number))) for number in udim_tiles(atlas)}
 
 
 def udim_names(

@@ -20,6 +20,7 @@ from flexpara.bake.maps.catalogue import find_map
 from flexpara.bake.raster.context import open_context
 from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.bake.raster.plan import SoftwareWarning
+from flexpara.bake.settings import BakeSettings
 from flexpara.runtime.errors import InputError, MissingDependencyError
 from flexpara.runtime.mesh import Asset, Atlas
 
@@ -300,3 +301,11 @@ def test_the_same_atlas_gives_the_same_files(sphere: Pair, tmp_path: Path) -> No
 
 def test_every_map_can_be_asked_for_by_name(quad: Pair) -> None:
     assert bake(*quad, ["chart"], size=4)["chart"].metadata["units"] == find_map("chart").units
+
+
+def test_settings_are_made_once_or_given_as_keywords(quad: Pair) -> None:
+    made = BakeSettings(size=8, padding=0)
+    assert bake(*quad, ["position"], made)["position"].pixels.shape == (8, 8, 3)
+    assert bake(*quad, ["position"], made, size=16)["position"].pixels.shape == (16, 16, 3)
+    with pytest.raises(InputError, match=r"sise is no option, expected some of .*; pass size"):
+        bake(*quad, ["position"], sise=8)
