@@ -115,7 +115,8 @@ class Charts:
 class Atlas:
     """Charts packed into the unit square; vertices are split along seams, so it is what an engine loads.
 
-    positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float32 in [0, 1], v up.  normals: (n, 3) float32 unit.
+    positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float32 in [0, 1], v up, multiples of 2⁻²⁴ where
+    `pack` made them, so that 1 − v is exact.  normals: (n, 3) float32 unit.
     face_chart: (f,) int64.  source_vertex: (n,) int64 into Asset.positions.
     size: texels per side.  padding: texels kept free around each chart (so two charts are 2 × padding apart).
     placement: (k, 2, 3) float64, chart coordinates → atlas uv (a similarity, same scale for all charts), or None
