@@ -246,7 +246,8 @@ class UnwrapResult:
             output.write(f"{output.stem}.{ending}", lambda path, content=content: path.write_bytes(content))
         if self.cloud is not None:
             self._write_points(output, self.cloud)
-        report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock)
+        apart = report["metrics"]["overlap_fraction"] == 0.0
+        report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock, apart=apart)
         if note is not None:
             for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)

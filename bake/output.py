@@ -41,16 +41,24 @@ class Baked:
 
 
 def write_outputs(
-    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
+    output: OutputFolder,
+    atlas: Atlas,
+    asset: Asset,
+    outputs: Outputs,
+    maps: Sequence[BakeMap],
+    clock: Clock,
+    *,
+    apart: bool = False,
 ) -> dict[str, Any]:
     """Textures, meshes in each format, preview; for the report what is known of "textures", and "written" of meshes.
 
-    outputs: without "auto".  Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
+    outputs: without "auto".  apart: whether no two triangles of the atlas are known to overlap in uv.
+    Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
     """
     atlas = with_tangents(atlas, maps)
     baked = bake_textures(output, atlas, asset, outputs, maps, clock)
     with clock.stage("write"):
-        written = write_meshes(output, atlas, asset, outputs, baked)
+        written = write_meshes(output, atlas, asset, outputs, baked, apart=apart)
     if outputs.preview:
         with clock.stage("preview"):
             _write_preview(output, atlas, asset)
@@ -121,7 +129,7 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
 
 
 def write_meshes(
-    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked
+    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked, *, apart: bool = False
 ) -> dict[str, dict[str, Any]]:
     """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
     from .files.written import written_report
@@ -140,7 +148,7 @@ def write_meshes(
 
     for kind in (name for name in writers if name in outputs.formats):
         output.write(f"{output.stem}.{kind}", partial(write, kind))
-    return written_report(staged, atlas.uv[atlas.faces])
+    return written_report(staged, atlas.uv[atlas.faces], apart=apart)
 
 
 def _write_glb(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:

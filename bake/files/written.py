@@ -46,19 +46,24 @@ class WrittenUv:
 
 
 def written_report(
-    files: Mapping[str, Path | None], corner_uv: NDArray[np.float32], *, read_back: int = READ_BACK
+    files: Mapping[str, Path | None],
+    corner_uv: NDArray[np.float32],
+    *,
+    apart: bool = False,
+    read_back: int = READ_BACK,
 ) -> dict[str, dict[str, Any]]:
     """Format → fields of `WrittenUv`.
 
     Args:
         files: format → the file, or None for one that is not kept.
         corner_uv: (f, 3, 2) float32 v up, what was to be written.
+        apart: whether no two of their triangles are known to overlap; files that hold the same are not tested again.
         read_back: most faces of a file that is read.
 
     Raises: MeshError when a file does not hold what its format asks for.
     """
     wanted = corner_uv.astype(np.float64)
-    known = [(wanted, _judged(wanted))]
+    known = [(wanted, _judged(wanted, apart=apart))]
     report: dict[str, dict[str, Any]] = {}
     for kind, path in files.items():
         reads = path is not None and len(wanted) <= read_back
@@ -92,9 +97,9 @@ def corner_uv_of(path: Path) -> NDArray[np.float64]:
         raise MeshError(f"{path.name} holds no triangles with uv ({error}); it was not written whole") from error
 
 
-def _judged(uv: NDArray[np.float64]) -> tuple[int, int]:
-    """Flipped triangles and overlapping pairs."""
-    return int(flipped_triangles(uv).sum()), len(overlapping_pairs(uv))
+def _judged(uv: NDArray[np.float64], *, apart: bool = False) -> tuple[int, int]:
+    """Flipped triangles and overlapping pairs; apart: whether there are known to be none of the latter."""
+    return int(flipped_triangles(uv).sum()), 0 if apart else len(overlapping_pairs(uv))
 
 
 def _glb_uv(data: bytes) -> NDArray[np.float64]:

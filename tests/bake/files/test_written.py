@@ -126,6 +126,9 @@ def test_overlaps_are_found(pair: Callable[..., Pair], tmp_path: Path) -> None:
     twice = pair([[0, 0, 0], [1, 0, 0], [0, 1, 0]] * 2, [[0, 1, 2], [3, 4, 5]], [[0, 0], [0.5, 0], [0, 0.5]] * 2)
     report = written_report(written(twice, tmp_path), twice[0].uv[twice[0].faces])
     assert {found["overlapping"] for found in report.values()} == {1}
+    paths = {kind: tmp_path / f"mesh.{kind}" for kind in FORMATS}
+    believed = written_report(paths, twice[0].uv[twice[0].faces], apart=True)
+    assert {found["overlapping"] for found in believed.values()} == {0}
 
 
 def test_large_meshes_are_judged_by_what_was_serialized(quad: Pair, tmp_path: Path) -> None:
