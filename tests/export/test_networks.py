@@ -24,8 +24,9 @@ from flexpara.runtime.errors import InputError, MissingFileError, ParityError, S
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.sessions.session import UnwrapSession
 from flexpara.train.deploy.config import GrowConfig
+from flexpara.train.deploy.experts import Lesson
 from flexpara.train.deploy.gated import GatedExperts
-from flexpara.train.deploy.grow import Lesson, grow
+from flexpara.train.deploy.grow import grow
 
 MapMaker = Callable[..., Any]
 

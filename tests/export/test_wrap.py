@@ -21,9 +21,10 @@ from flexpara.runtime.errors import MissingFileError, ParityError, ShapeError
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.sessions.wrapsession import WrapSession
 from flexpara.train.deploy.config import GrowConfig
+from flexpara.train.deploy.experts import Lesson
 from flexpara.train.deploy.fit_wrap import above_layer, on_layers
 from flexpara.train.deploy.gated import GatedExperts
-from flexpara.train.deploy.grow import Lesson, grow
+from flexpara.train.deploy.grow import grow
 
 MapMaker = Callable[..., Any]
 

@@ -60,6 +60,8 @@ class GrowConfig:
     """What an affine map on a surface counts for, in samples, where two charts meet."""
     gate_ridge: float = 1e-4
     """Ridge of the affine maps that gates are compared by, as a share of the node's squared extent."""
+    torn: float = 8.0
+    """An expert that misses its samples by so many tolerances (rms) holds two sides of a slit, and takes one."""
     slack: float = 1.5
     """Radius within which an expert is sure, as a multiple of the distance of its farthest sample …"""
     near: float = 0.125

@@ -17,7 +17,8 @@ import numpy as np
 from ...runtime.errors import InputError
 from ...runtime.geometry.normals import corner_normals, interpolated_normals
 from .config import WrapConfig
-from .grow import Lesson, grow
+from .experts import Lesson
+from .grow import grow
 from .lessons import face_slopes, spots_on
 
 if TYPE_CHECKING:

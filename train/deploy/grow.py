@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
+from .experts import Lesson, fit_affine, untorn
 from .gated import GatedExperts, Grid
 from .gates import Chosen, Spread, best_gates, second_side
 
@@ -23,32 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .config import GrowConfig
-
-
-class Lesson(NamedTuple):
-    """What is learned.
-
-    x (n, d), y (n, m): inputs and outputs.  label (n,) int64.  slope (n, m, d): how y changes with x along the surface.
-    plane (n, d + 1): a gate that parts the samples around this one, NaN where none is known.
-    """
-
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    label: NDArray[np.int64]
-    slope: NDArray[np.float64]
-    plane: NDArray[np.float64]
-
-    def among(self, rows: NDArray[np.int64]) -> Lesson:
-        """Those samples, in that order."""
-        return Lesson(self.x[rows], self.y[rows], self.label[rows], self.slope[rows], self.plane[rows])
-
-
-class Fitted(NamedTuple):
-    """Affine maps of nodes: y = mean_y + slope · (x − mean_x).  mean_x (k, d), mean_y (k, m), slope (k, m, d)."""
-
-    mean_x: NDArray[np.float64]
-    mean_y: NDArray[np.float64]
-    slope: NDArray[np.float64]
 
 
 class Nodes(NamedTuple):
@@ -116,7 +91,7 @@ def grow_on(grid: Grid, lesson: Lesson, config: GrowConfig, tolerance: float, rn
         done = _is_done(apart, nodes, config, tolerance, decided) | (depth >= config.deepest)
         nodes = _halve(apart, nodes, done, config, decided, rng)
         depth += len(nodes.first) > 0
-    return _assembled(lesson, grid, slot, decided, depth, config)
+    return _assembled(lesson, grid, slot, decided, depth, config, tolerance)
 
 
 def lay_grid(x: NDArray[np.float64], most: int, longest: int) -> Grid:
@@ -139,21 +114,6 @@ def _filled_grid(x: NDArray[np.float64], cells: int, config: GrowConfig) -> Grid
         if cells <= config.coarsest or len(x) >= config.per_cell * len(np.unique(grid.number(x.astype(np.float32)))):
             return grid
         cells = max(cells * 2 // 3, config.coarsest)
-
-
-def fit_affine(lesson: Lesson, first: NDArray[np.int64], ridge: float) -> Fitted:
-    """Ridge regressions of y on x, one a node; ``lesson`` comes node by node, first (k,): where each begins."""
-    count = np.diff(first, append=len(lesson.x))
-    owner = np.repeat(np.arange(len(first)), count)
-    mean_x, mean_y = (np.add.reduceat(part, first, axis=0) / count[:, None] for part in (lesson.x, lesson.y))
-    x, y = lesson.x - mean_x[owner], lesson.y - mean_y[owner]
-    gram = np.add.reduceat(x[:, :, None] * x[:, None, :], first, axis=0)
-    cross = np.add.reduceat(x[:, :, None] * y[:, None, :], first, axis=0)
-    prior = np.add.reduceat(lesson.slope, first, axis=0) / count[:, None, None]
-    pull = ridge * np.trace(gram, axis1=1, axis2=2) / x.shape[1] + np.finfo(np.float64).tiny
-    pull = pull[:, None, None]
-    slope = np.linalg.solve(gram + pull * np.eye(x.shape[1]), cross + pull * prior.transpose(0, 2, 1))
-    return Fitted(mean_x, mean_y, slope.transpose(0, 2, 1))
 
 
 def _apart(lesson: Lesson) -> Lesson:
@@ -256,16 +216,22 @@ def _settle(nodes: Nodes, gated: NDArray[np.bool_], decided: Decided) -> None:
 
 
 def _assembled(
-    lesson: Lesson, grid: Grid, occupied: NDArray[np.int64], decided: Decided, depth: int, config: GrowConfig
+    lesson: Lesson,
+    grid: Grid,
+    occupied: NDArray[np.int64],
+    decided: Decided,
+    depth: int,
+    config: GrowConfig,
+    tolerance: float,
 ) -> GatedExperts:
-    """The network: experts fitted to the samples of their own label, cells without samples given to the nearest."""
+    """The network: experts fitted to the samples of their own label; cells without samples begin like the nearest."""
     rows, owner = np.concatenate(decided.rows), np.concatenate(decided.owners)
     label, share = _majority(lesson.label[rows], owner, decided.expert_count)
     own = lesson.label[rows] == label[owner]
     rows, owner = rows[own], owner[own]
     order = np.argsort(owner, kind="stable")
     own, first = lesson.among(rows[order]), np.searchsorted(owner[order], np.arange(decided.expert_count))
-    fitted = fit_affine(own, first, config.ridge)
+    fitted = untorn(own, first, fit_affine(own, first, config.ridge), config.torn * tolerance)
     bias = fitted.mean_y - np.einsum("kmd,kd->km", fitted.slope, fitted.mean_x)
     away = np.linalg.norm(own.x - fitted.mean_x[owner[order]], axis=1)
     codes = np.where(decided.codes < 0, decided.gate_count - 1 - decided.codes, decided.codes).astype(np.int32)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ..sampling import sample_surface, samples_in_faces
-from .grow import Lesson
+from .experts import Lesson
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

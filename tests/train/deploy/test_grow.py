@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flexpara.train.deploy.config import GrowConfig
+from flexpara.train.deploy.experts import Lesson, fit_affine
 from flexpara.train.deploy.gated import GatedExperts
-from flexpara.train.deploy.grow import Lesson, fit_affine, grow, lay_grid, nearest_cells
+from flexpara.train.deploy.grow import grow, lay_grid, nearest_cells
 
 PLAIN = GrowConfig()
 
@@ -104,6 +105,17 @@ def test_what_lies_in_the_same_place_cannot_be_told_apart_and_says_so() -> None:
     answer = network(x.astype(np.float32))
     assert len(network.label) < 1500
     assert 0.5 < answer.score.mean() < 0.7
+
+
+def test_two_sides_of_a_slit_in_one_place_are_not_averaged() -> None:
+    """One label, outputs of two sides all over each other: each answer is right on one side, and not steep."""
+    x, side = square(40_000), rng(3).random(40_000) < 0.4
+    lesson = lesson_of(x, x[:, :2] + 9.0 * side[:, None])
+    network = grown(lesson._replace(slope=np.tile(np.eye(2, 3), (len(x), 1, 1))), 1e-2)
+    answer = network(x.astype(np.float32)).value
+    gap = np.minimum(*(np.linalg.norm(answer - x[:, :2] - step, axis=1) for step in (0.0, 9.0)))
+    assert np.percentile(gap, 95) < 0.05
+    assert np.abs(network.weights[:, :, :3]).max() < 100.0
 
 
 def test_the_budget_of_experts_is_kept() -> None:
