@@ -8,50 +8,50 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .deploy.config import FitConfig, WrapConfig
+from .finish.config import SlitConfig
 
 
 @dataclass(frozen=True)
-class NetConfig:
-    """Sizes of the networks.  The paper uses width 512 throughout; 64 is a choice for CPUs, not compared."""
+class PlanarConfig:
+    """Flat regions, and unfolding them without stretch."""
 
-    width: int = 64
-    """Channels of the hidden layers of embedding, Assign-, Unwrap- and Wrap-Nets."""
+    angle: float = 1e-4
+    """Angle between normals, in radians, up to which two faces lie in one plane."""
+    rounding: float = 8.0
+    """The same as a multiple of what float32 coordinates can turn the normal of a face by."""
+    largest_angle: float = 0.5
+    """The most that rounding excuses, in radians."""
+    deviation: float = 1e-5
+    """Distance from its plane, as a share of the surface's extent, beyond which a region is curved."""
+    meeting: float = 1e-6
+    """Distance, as a share of the surface's extent, up to which two edges of a layout are one: float32's rounding."""
+    shared: float = 0.1
+    """Share of the shorter border that two developments must have in common to be joined."""
+    fill: float = 0.5
+    """Share of the least rectangle around it that a development must cover: less wastes the texture."""
+    most: int = 2000
+    """Flat regions of a part that unfolding is tried with."""
+    digits: int = 6
+    """Decimal digits to which shares of a border are compared: what is equal but for rounding counts as equal."""
+    few: int = 3
+    """So many developments of a whole part, or less, are taken as they are."""
+    facets: int = 24
+    """A part of so many flat regions, or less, is made of facets: it is unfolded, if that needs no more charts than
+    allowed."""
+    flat_share: float = 0.6
+    """The same for flat regions per face: a mesh whose faces lie mostly in common planes is made of facets."""
 
 
 @dataclass(frozen=True)
-class StartConfig:
-    """The geometric start: clusters of surface samples, and networks fitted to them (design: measured prototype)."""
+class SliverConfig:
+    """Triangles thinner than the numbers that hold them."""
 
-    samples: int = 8000
-    """Surface samples that are clustered."""
-    normal_weight: float = 0.5
-    """Weight of the unit normal against the position in the clustering distance."""
-    rounds: int = 12
-    """Lloyd iterations."""
-    fit_steps: int = 100
-    """Steps of fitting the networks to cluster labels and plane projections."""
-    fit_rate: float = 5e-3
-    """Peak learning rate of that fit."""
-    fit_normal_weight: float = 0.1
-    """Weight of the squared gap of normals in that fit, beside those of uv and position."""
-
-
-@dataclass(frozen=True)
-class JointConfig:
-    """Joint training: the paper's score-weighted losses."""
-
-    steps: int = 100
-    """Optimizer steps."""
-    batch: int = 512
-    """Surface samples a step."""
-    peak_rate: float = 4e-3
-    """Peak learning rate of the one-cycle schedule (Adam)."""
-    distortion_weight: float = 1.0
-    """Weight of the ARAP energy of the 3D → 2D map."""
-    cycle_weight: float = 10.0
-    """Weight of |P − P_cycle|₁ (paper: α_c = 10)."""
-    normal_weight: float = 1.0
-    """Weight of the cosine distance of normals."""
+    height: float = 3e-7
+    """Least height of a triangle, as a share of its part's extent."""
+    aspect: float = 1e-3
+    """Height per longest side above which a triangle is small, not thin, and is left alone."""
+    rounds: int = 5
+    """Times the thin ones are looked for."""
 
 
 @dataclass(frozen=True)
@@ -67,57 +67,57 @@ class LabelConfig:
 
 
 @dataclass(frozen=True)
-class ContactConfig:
-    """Taking overlap inside a chart apart."""
+class StartConfig:
+    """First labels of a search: k-means of a part's faces by position and normal, at area 1."""
 
-    rounds: int = 10
-    """Rounds of pinning, SLIM and the exact test."""
-    iterations: int = 2
-    """SLIM iterations a round."""
-    block: int = 5
-    """SLIM iterations between two looks at the energy."""
-    blocks: int = 10
-    """Blocks at most."""
-    still: float = 0.04
-    """A block that lowers the energy by less than this share ends the run."""
-    patience: float = 3.0
-    """How many more drops like the last one a block is trusted with."""
-    step: int = 3
-    """SLIM iterations between two tests where contacts are needed."""
-    steps: int = 5
-    """Such steps at most."""
-    margin: float = 0.01
-    """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
-    weight: float = 10.0
-    """Weight of the pins against the distortion energy."""
-    most: float = 0.5
-    """Share of the boundary that may be buried before the case is given up."""
+    counts: tuple[float, ...] = (1.0, 0.0, 1.0)
+    """Clusters of each start, as a multiple of the charts asked for; 0 is the part as a whole."""
+    counts_small: tuple[float, ...] = (0.0,)
+    """The same for a part of small share; it gets the others too, where this leaves it stretched."""
+    counts_holed: tuple[float, ...] = (1.0,)
+    """The same for a part of many handles."""
+    handles: int = 8
+    """Handles above which a part has many."""
+    worth: float = 0.05
+    """Share of the whole surface below which a part is of small share."""
+    least_faces: int = 8
+    """Faces a cluster has on average at least."""
+    position_weight: float = 1.8
+    """Weight of the position against the normal in the clustering distance."""
+    normal_weight: float = 0.5
+    """Weight of the unit normal."""
+    rounds: int = 12
+    """Lloyd iterations."""
+    certainty: float = 10.0
+    """−log probability of a label per squared distance beyond the nearest cluster's."""
 
 
 @dataclass(frozen=True)
-class ReliefConfig:
-    """Slits inside charts.  Lengths are shares of √(surface area)."""
+class CarryConfig:
+    """From the simplified twin back to the surface."""
 
-    price: float = 0.003
-    """Mean excess energy (symmetric Dirichlet − 1, share of the surface's area) that a slit of length 1 has to save."""
-    radius: float = 0.03
-    """Neighbourhood over which stress is averaged."""
-    shortest: float = 0.1
-    """Slits shorter than this are judged as if they had this length."""
-    near: float = 0.03
-    """No slit aims at a vertex closer to the border than this."""
-    ways: int = 1
-    """Ways to the same vertex that are tried."""
-    apart: float = 0.6
-    """How far from the first way's start the second must start, as a share of its length."""
-    failures: int = 3
-    """Slits that may fail to pay before a chart is left as it is."""
-    most: int = 12
-    """Slits a chart may get."""
-    contact: ContactConfig = field(default_factory=ContactConfig)
-    """How a slit that folds over itself is held apart."""
-    crease_discount: float = 0.8
-    """How much cheaper a slit is along a sharp crease, in [0, 1)."""
+    neighbours: int = 3
+    """Nearest faces of the twin that vote for a face's label."""
+    normal_weight: float = 0.1
+    """Weight of the unit normal against the position, at area 1, in that distance."""
+    band: int = 4
+    """Rings of faces beside a border that may change sides."""
+    rigid_steps: int = 4
+    """Steps of as-rigid-as-possible flattening from the twin's rotations."""
+
+
+@dataclass(frozen=True)
+class SplitConfig:
+    """Where a chart may be cut in two: along isolines of the distance from a seed."""
+
+    levels: int = 22
+    """Isolines looked at."""
+    outermost: float = 0.08
+    """Share of the faces before the first of them, and after the last."""
+    necks: int = 2
+    """Isolines tried for each seed: those short for what they cut off."""
+    energy_left: float = 0.9
+    """Share of a chart's energy below which its parts must stay, where it is cut in two whatever the limit."""
 
 
 @dataclass(frozen=True)
@@ -125,12 +125,48 @@ class FinishConfig:
     """From labels to valid charts."""
 
     labels: LabelConfig = field(default_factory=LabelConfig)
-    relief: ReliefConfig = field(default_factory=ReliefConfig)
+    slit: SlitConfig = field(default_factory=SlitConfig)
+    planar: PlanarConfig = field(default_factory=PlanarConfig)
+    """Flat regions, and unfolding them."""
+    start: StartConfig = field(default_factory=StartConfig)
+    """First labels of the searches."""
+    sliver: SliverConfig = field(default_factory=SliverConfig)
+    """Triangles thinner than the numbers that hold them."""
+    congruence: float = 1e-5
+    """Distance, as a share of its size, up to which a part is a copy of another."""
     surrogate_faces: int = 2500
     """Faces of the simplified surface on which charts are split and merged."""
+    whole_faces: int = 8000
+    """Faces up to which a part that unfolds is searched as it is, not simplified."""
+    fewest_faces: int = 300
+    """The same for a part of little area."""
+    faces_per_handle: int = 80
+    """Faces of the simplified surface for each handle of the part, where that is more."""
+    handles_per_cluster: float = 2.0
+    """Handles that a first cluster may have: a part with more starts from more clusters than charts were asked for."""
+    carry: CarryConfig = field(default_factory=CarryConfig)
+    """From the simplified twin back to the surface."""
+    split: SplitConfig = field(default_factory=SplitConfig)
+    """Where a chart may be cut in two."""
+    foretold: float = 0.4
+    """Energy of a flattening as a share of what curvature foretells, in the median."""
+    hopeless: float = 1.5
+    """Mean excess energy of a flattening that is not even tested for overlap."""
+    bearable: float = 0.5
+    """Mean excess energy above which a piece is cut before anything else."""
+    doubt: float = 0.003
+    """How much better than foretold a merge may turn out: those foretold worse are not tried."""
+    looks: int = 4
+    """Merges flattened at a time."""
+    patience: int = 12
+    """Merges flattened in vain before the rest, foretold worse, are believed not to pay."""
+    few_rounds: int = 2
+    """As ``rounds``, for a part of small share."""
+    most_excess: float = 0.05
+    """Mean excess energy of a part above which it gets more charts than asked for."""
     rounds: int = 8
     """Times the worst chart may be split."""
-    stubborn: int = 3
+    vain_splits: int = 3
     """Charts that no split improves, before the search ends."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
@@ -138,9 +174,9 @@ class FinishConfig:
     """Borders tried for each split and seed."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
-    bump: float = 0.03
-    """Share of the surface under which a piece is a bump: a merge with it is weighed with slits."""
-    dear: float = 0.02
+    small: float = 0.03
+    """Share of the surface under which a piece is small: a merge across a short border is tried too."""
+    slit_above: float = 0.02
     """Excess energy over which a finished piece is slit once more, with contacts."""
 
 
@@ -152,9 +188,6 @@ class TrainConfig:
     """K: the most charts a connected surface may get."""
     seed: int = 0
     """Seed of all generators."""
-    net: NetConfig = field(default_factory=NetConfig)
-    start: StartConfig = field(default_factory=StartConfig)
-    joint: JointConfig = field(default_factory=JointConfig)
     finish: FinishConfig = field(default_factory=FinishConfig)
     fit: FitConfig = field(default_factory=FitConfig)
     wrap: WrapConfig = field(default_factory=WrapConfig)

@@ -1,6 +1,6 @@
 """From a surface to finished charts and the networks that answer for them.
 
-surface (source units) → unit ball → joint training → finishing → fit.  Charts come back in source units.
+surface (source units) → unit ball → charts → fit.  Charts come back in source units.
 """
 
 from __future__ import annotations
@@ -9,19 +9,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from ..runtime.mesh import Charts, Frame, Surface
 from .deploy.fit import fit_networks
-from .finish.finish import Finished, finish
-from .learn.joint import train_jointly
-from .learn.networks import MultiChartNetworks
-from .sampling import sample_surface
+from .search.charts import Finished, chart_surface
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
     from torch import nn
 
     from ..runtime.progress import Progress
@@ -55,10 +50,7 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
     """
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
-    samples = sample_surface(ball, config.start.samples, np.random.default_rng(config.seed))
-    steps = config.joint.steps
-    scorer = train_jointly(samples, config, config.seed, lambda step, loss: progress("train", step, steps, loss))
-    finished = finish(ball, log_probability(scorer), config.charts, config.finish, in_turn(progress))
+    finished = chart_surface(ball, config.charts, config.finish, config.seed, in_turn(progress))
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
@@ -66,7 +58,9 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
     report = {
         "experts": len(networks.label),
         "objective": finished.objective,
-        "slit_length": sum(piece.slits for piece in finished.pieces),
+        "parts": finished.parts,
+        "notes": list(finished.notes),
+        "slit_length": sum(piece.slit_length for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
@@ -83,17 +77,6 @@ def in_turn(progress: Progress) -> Callable[[str], None]:
         progress(name, 0, 1)
 
     return begin
-
-
-def log_probability(networks: MultiChartNetworks) -> Any:
-    """The Assign-Net as a numpy function: (n, 3) unit ball → (n, p) log probabilities."""
-
-    @torch.no_grad()
-    def evaluate(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-        logits = networks.scores(torch.from_numpy(xyz.astype(np.float32)))
-        return torch.log_softmax(logits.double(), dim=-1).numpy()
-
-    return evaluate
 
 
 def as_charts(surface: Surface, finished: Finished) -> Charts:

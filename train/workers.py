@@ -28,6 +28,10 @@ MOST = 16384
 """Tickets that a pipe surely holds at once (64 KiB on Linux, 16 bits each)."""
 
 
+_sharing: list[bool] = []
+"""Not empty while work is shared: what is shared out shares nothing itself, or copies would make copies."""
+
+
 class Copy(NamedTuple):
     """A forked copy of this process: its number, and the end of the pipe that its results come from."""
 
@@ -43,8 +47,9 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
     Raises: what the function raises; FinishError when a copy was killed.
     """
     helpers = min(available_cores(), len(items), MOST) - 1
-    if helpers < 1 or len(items) > MOST:
+    if helpers < 1 or len(items) > MOST or _sharing:
         return [function(item) for item in items]
+    _sharing.append(True)
     tickets = ticket_pipe(len(items))
     copies: list[Copy] = []
     try:
@@ -53,6 +58,7 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
         for copy in copies:
             done |= collected(copy)
     finally:
+        _sharing.clear()
         os.close(tickets)
         for copy in copies:
             dismiss(copy)

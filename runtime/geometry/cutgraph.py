@@ -36,11 +36,24 @@ def crease_sharpness(surface: Surface, table: EdgeTable) -> NDArray[np.float64]:
     return np.where(table.manifold, np.clip((1.0 - cosine) / 0.5, 0.0, 1.0), 0.0)
 
 
+FLAT = 5e-9
+"""1 − cos of the dihedral deviation below which an edge lies inside a flat face: about 1e-4 radians."""
+FLAT_SURCHARGE = 8.0
+"""How many times its length a cut through a flat face costs: a crease nearby is cheaper."""
+
+
+def seam_prices(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.float64]:
+    """(e,) price per length of a cut along each edge: 1, down to 1 − crease_discount in creases, more in flat faces."""
+    sharpness = crease_sharpness(surface, table)
+    flat = table.manifold & (sharpness * 0.5 < FLAT)
+    return np.where(flat, FLAT_SURCHARGE, 1.0 - crease_discount * sharpness)
+
+
 def edge_costs(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.float64]:
-    """(e,) length of each edge, down to (1 − crease_discount) of it along sharp creases: cuts hide there."""
+    """(e,) what a cut along each edge costs: its length times its price."""
     ends = surface.vertices[table.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return np.maximum(length * (1.0 - crease_discount * crease_sharpness(surface, table)), 1e-12)
+    return np.maximum(length * seam_prices(surface, table, crease_discount), 1e-12)
 
 
 def shortest_paths(

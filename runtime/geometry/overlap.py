@@ -63,6 +63,14 @@ def overlapping_pairs(uv: NDArray[np.float64]) -> NDArray[np.int64]:
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
+def overlaps_anywhere(uv: NDArray[np.float64]) -> bool:
+    """True where the interiors of two triangles (f, 3, 2) intersect: ``overlapping_pairs`` up to the first."""
+    sign = orientation_sign(uv[:, 0], uv[:, 1], uv[:, 2])
+    solid = np.flatnonzero(sign)
+    triangles = np.where((sign < 0)[:, None, None], uv[:, ::-1], uv)[solid]
+    return any(bool(_interiors_meet(triangles, pairs).any()) for pairs in _candidate_pairs(triangles))
+
+
 def overlap_area(uv: NDArray[np.float64], pairs: NDArray[np.int64]) -> float:
     """Summed areas of the intersections of pairs (p, 2) of triangles of uv (f, 3, 2), in uv units squared."""
     sign = orientation_sign(uv[:, 0], uv[:, 1], uv[:, 2])

@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.overlap import overlapping_pairs
+from ...runtime.geometry.distortion import excess, oriented_energy
+from ...runtime.geometry.overlap import overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table
-from .flatten import ISOMETRIC, Pins, Slim, jacobians, slim, symmetric_dirichlet
+from .flatten import ISOMETRIC, Pins, Slim, jacobians, slim
 
 if TYPE_CHECKING:
     import igl
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
-    from ..config import ContactConfig
+    from .config import ContactConfig
 
 
 def boundary_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -95,10 +96,14 @@ def rim_overlaps(faces: NDArray[np.int64], edges: NDArray[np.int64], uv: NDArray
 
     Two border edges that cross belong to two triangles that overlap, so only the triangles along the border are tested.
     """
-    on_border = np.zeros(len(uv), dtype=bool)
+    return overlaps_anywhere(uv[faces[rim_faces(faces, edges)]])
+
+
+def rim_faces(faces: NDArray[np.int64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Rows of the faces (f, 3) with two corners or more on the border, whose directed edges are (b, 2)."""
+    on_border = np.zeros(int(faces.max()) + 1, dtype=bool)
     on_border[edges[:, 0]] = True
-    rim = faces[on_border[faces].sum(axis=1) >= 2]
-    return len(overlapping_pairs(uv[rim])) > 0
+    return np.flatnonzero(on_border[faces].sum(axis=1) >= 2)
 
 
 def separate(
@@ -124,8 +129,8 @@ def separate(
 
 
 def excess_energy(surface: Surface, uv: NDArray[np.float64]) -> float:
-    """Σ area · (symmetric Dirichlet − 1), each face capped at 10 so that no sliver decides; source units squared."""
-    return float(surface.face_areas() @ np.minimum(symmetric_dirichlet(jacobians(surface, uv)) - 1.0, 10.0))
+    """Σ area · (symmetric Dirichlet − 1), each face capped so that no sliver decides; source units squared."""
+    return float(surface.face_areas() @ excess(oriented_energy(jacobians(surface, uv))))
 
 
 def converge(surface: Surface, start: Relaxed, goal: float, config: ContactConfig) -> NDArray[np.float64] | None:

@@ -12,7 +12,7 @@ from ...runtime.geometry.topology import components, edge_table
 from ...runtime.mesh import Surface
 from .contact import excess_energy
 from .pieces import Piece
-from .relief import Flat
+from .slits import Flat
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

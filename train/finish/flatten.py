@@ -12,6 +12,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from ...runtime.geometry import triangles
+from ...runtime.geometry.distortion import oriented_energy
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import boundary_loops
 from ...runtime.mesh import Surface
@@ -30,29 +32,13 @@ class Pins(NamedTuple):
 
 def jacobians(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
     """(f, 2, 2) derivative of uv in an orthonormal basis of each face, for uv (v, 2)."""
-    corner, flat = surface.triangles, uv[surface.faces]
-    e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    length = np.maximum(np.linalg.norm(e1, axis=1), 1e-300)
-    along = np.einsum("fc,fc->f", e1, e2) / length
-    height = np.maximum(np.linalg.norm(np.cross(e1, e2), axis=1) / length, 1e-300)
-    first = (flat[:, 1] - flat[:, 0]) / length[:, None]
-    second = (flat[:, 2] - flat[:, 0] - along[:, None] * first) / height[:, None]
-    return np.stack([first, second], axis=2)
-
-
-def symmetric_dirichlet(jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(σ₁² + σ₂² + σ₁⁻² + σ₂⁻²) / 4 per face, 1 = isometric, ∞ for a flip.   (f, 2, 2) → (f,)."""
-    frobenius = (jacobian**2).sum(axis=(1, 2))
-    determinant = np.linalg.det(jacobian)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        energy = frobenius * (1.0 + determinant**-2) / 4.0
-    return np.where(determinant > 0.0, energy, np.inf)
+    return triangles.jacobians(surface.triangles, uv[surface.faces])
 
 
 def mean_distortion(surface: Surface, uv: NDArray[np.float64]) -> float:
     """Area-weighted mean symmetric Dirichlet energy of a piece."""
     areas = surface.face_areas()
-    return float(symmetric_dirichlet(jacobians(surface, uv)) @ areas / areas.sum())
+    return float(oriented_energy(jacobians(surface, uv)) @ areas / areas.sum())
 
 
 def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]:

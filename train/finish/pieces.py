@@ -1,28 +1,34 @@
-"""One piece of a surface: opened into a disk, flattened, relieved; and what that cost.
+"""One piece of a surface: opened into a disk, flattened, slit; and what that cost.
 
 ids (m,) are faces of the surface.  Areas and lengths are shares of the whole surface: area / A, length / √A.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic, split_non_manifold_vertices
 from ...runtime.mesh import Surface
-from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_overlaps
+from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_faces, rim_overlaps, separate
+from .curvature import border_first
 from .disks import cut_open, disk_cuts
 from .flatten import circle_map, fill_holes, slim, sorted_loops
-from .relief import Flat, Slit, relieve, slit_along
+from .rigid import unfolded
+from .slits import Flat, Slit, foreseen_slits, slit_along, slit_where_it_pays
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from ..config import ContactConfig, FinishConfig, ReliefConfig
+    Start = Callable[[Surface], NDArray[np.float64]]
+
+    from ..config import FinishConfig
+    from .config import ContactConfig, SlitConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,25 +36,49 @@ class Piece:
     """A set of faces and its valid flattening.
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
-    slits: length of the cuts inside the piece, in √A.  relief: those made for relief, in order.
+    slit_length: of all cuts inside the piece, in √A.  slits: those made against stretch, in order.
     resort: "xatlas" where all else failed.
     """
 
     ids: NDArray[np.int64]
     flat: Flat
     energy: float
-    slits: float
-    relief: tuple[Slit, ...] = ()
+    slit_length: float
+    slits: tuple[Slit, ...] = ()
     resort: str = ""
 
     @property
     def method(self) -> str:
         """How the piece became valid: "slim", "slit" where cuts inside it helped, or its last resort."""
-        return self.resort or ("slit" if self.slits > 0.0 else "slim")
+        return self.resort or ("slit" if self.slit_length > 0.0 else "slim")
 
     def cost(self, price: float) -> float:
         """What the piece adds to the objective, its border left out."""
-        return self.energy + price * self.slits
+        return self.energy + price * self.slit_length
+
+    def rim(self, surface: Surface) -> NDArray[np.int64]:
+        """Vertices of the surface that lie on the piece's border or on its slits."""
+        faces = self.flat.surface.faces
+        on_border = np.zeros(len(self.flat.surface.vertices), dtype=bool)
+        on_border[boundary_edges(faces)] = True
+        return np.unique(surface.faces[self.ids][on_border[faces]])
+
+
+@dataclass(frozen=True, eq=False)
+class Overlapping:
+    """A set of faces whose flattening without flips lies over itself.
+
+    ids: (m,) int64.  faces: (m, 3) of the opened piece.  uv: (v, 2).
+    """
+
+    ids: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float64]
+
+    def pairs(self) -> NDArray[np.int64]:
+        """(p, 2) rows of faces along the border that overlap."""
+        rim = rim_faces(self.faces, boundary_edges(self.faces))
+        return rim[overlapping_pairs(self.uv[self.faces[rim]])]
 
 
 def extract(surface: Surface, ids: NDArray[np.int64]) -> Surface:
@@ -75,25 +105,43 @@ def openings(piece: Surface, crease_discount: float) -> Iterator[Surface]:
         yield Surface(piece.vertices[old], faces)
 
 
-def flattened(piece: Surface, config: ContactConfig, goal: float) -> NDArray[np.float64] | None:
-    """The uv (v, 2) of a disk, holes allowed, after SLIM: without flips and overlap.
+def flattened(
+    piece: Surface, config: ContactConfig, goal: float, given: Start | None = None
+) -> NDArray[np.float64] | None:
+    """The uv (v, 2) of a disk, holes allowed, after SLIM: without flips; it may overlap.
 
     None where that can't be had, or where ``goal`` (excess energy, source units squared) is out of sight.  Holes are
-    filled while SLIM runs, so that they stay open.  The circle map is valid and SLIM leaves it step by step, so where
-    the end overlaps, early states are tried.
+    filled while SLIM runs, so that they stay open.  SLIM starts from the border laid out with its own lengths, which
+    is close to where it ends, or where that folds over, from the circle.
     """
     outer, *holes = sorted_loops(piece)
     filled = fill_holes(piece, holes)
-    start = circle_map(filled, outer)
-    edges = boundary_edges(piece.faces)
-    free = converge(filled, Relaxed(start, {}), goal, config)
-    if free is None:
+    start = flipless_start(filled, outer, config.unfolding, given)
+    if start is None:
         return None
-    for attempt in (lambda: free, lambda: slim(filled, start, 3), lambda: slim(filled, start, 1)):
-        uv = attempt()[: len(piece.vertices)]
-        if np.isfinite(uv).all() and not rim_overlaps(piece.faces, edges, uv):
-            return uv
-    return None
+    uv = converge(filled, Relaxed(start, {}), goal, config)
+    if uv is None or not np.isfinite(uv).all():
+        return None
+    return uv[: len(piece.vertices)]
+
+
+def flipless_start(
+    disk: Surface, loop: NDArray[np.int64], steps: int, given: Start | None = None
+) -> NDArray[np.float64] | None:
+    """A first uv (v, 2) of a disk without flips: near its isometry, else on the circle; None where both have flips.
+
+    ``given`` is tried before the border laid out with its own lengths; ``steps``: rigid steps to lose flips in.
+    """
+    laid_out = [lambda disk: border_first(disk, loop)]
+    for start in laid_out if given is None else [given, *laid_out]:
+        uv = start(disk)
+        if not np.isfinite(uv).all():
+            continue
+        near = unfolded(disk, uv, steps) if flipped_triangles(uv[disk.faces]).any() else uv
+        if near is not None:
+            return near
+    uv = circle_map(disk, loop)
+    return uv if np.isfinite(uv).all() and not flipped_triangles(uv[disk.faces]).any() else None
 
 
 def make_piece(
@@ -104,30 +152,73 @@ def make_piece(
     slits: tuple[Slit, ...] = (),
     goal: float = np.inf,
 ) -> Piece | None:
-    """The best plain flattening of the faces, with the slits given and where topology asks for it.
+    """The best flattening of the faces, with the slits given, those that curvature asks for, and where topology does.
 
     None where all overlap, or cost more than ``goal`` (excess energy over the whole area).
     """
+    found = try_piece(surface, ids, total_area, config, slits, goal)
+    return found if isinstance(found, Piece) else None
+
+
+def try_piece(
+    surface: Surface,
+    ids: NDArray[np.int64],
+    total_area: float,
+    config: FinishConfig,
+    slits: tuple[Slit, ...] = (),
+    goal: float = np.inf,
+    start: Start | None = None,
+) -> Piece | Overlapping | None:
+    """As ``make_piece``; where every flattening overlaps, the first of them.
+
+    ``start``: a first uv of the opened piece, which then gets no slits but those given.
+    """
     whole = extract(surface, ids)
-    unit, best = float(np.sqrt(total_area)), None
-    for plain in openings(whole, config.relief.crease_discount):
-        disk = slit_along(plain, slits, config.relief)
-        uv = flattened(disk, config.relief.contact, goal * total_area)
+    unit, price = float(np.sqrt(total_area)), config.slit.price
+    best: Piece | Overlapping | None = None
+    for plain in openings(whole, config.slit.crease_discount):
+        disk, more = slit_along(plain, slits, config.slit), ()
+        if start is None:
+            disk, more = foreseen_slits(disk, total_area, config.slit)
+        uv = flattened(disk, config.slit.contact, goal * total_area, start)
         if uv is None:
             continue
-        flat = Flat(disk, uv, {})
-        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
         energy = excess_energy(disk, uv) / total_area
-        piece = Piece(ids, flat, energy, length, slits)
-        if best is None or piece.cost(config.relief.price) < best.cost(config.relief.price):
+        if energy * total_area > config.hopeless * float(disk.face_areas().sum()):
+            continue
+        edges = boundary_edges(disk.faces)
+        if rim_overlaps(disk.faces, edges, uv):
+            apart = separate(disk, Relaxed(uv, {}), edges, config.slit.contact) if start is not None else None
+            if apart is None:
+                best = best or Overlapping(ids, disk.faces, uv)
+                continue
+            uv, energy = apart.uv, excess_energy(disk, apart.uv) / total_area
+        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
+        piece = Piece(ids, Flat(disk, uv, {}), energy, length, (*slits, *more))
+        if not isinstance(best, Piece) or piece.cost(price) < best.cost(price):
             best = piece
     return best
 
 
-def relieved(piece: Piece, total_area: float, config: ReliefConfig) -> Piece:
-    """The piece with the slits that pay."""
+def slit_further(piece: Piece, total_area: float, config: SlitConfig, *, contacts: bool = False) -> Piece:
+    """The piece with the slits that pay.  ``contacts``: those that overlap are held apart (slow), else left out."""
+    if not contacts:
+        config = replace(config, contact=replace(config.contact, rounds=0))
     before = border_length(piece.flat.surface)
-    flat, slits = relieve(piece.flat, total_area, config)
-    length = piece.slits + (border_length(flat.surface) - before) / 2.0 / float(np.sqrt(total_area))
+    flat, slits = slit_where_it_pays(piece.flat, total_area, config)
+    length = piece.slit_length + (border_length(flat.surface) - before) / 2.0 / float(np.sqrt(total_area))
     energy = excess_energy(flat.surface, flat.uv) / total_area
-    return Piece(piece.ids, flat, energy, length, (*piece.relief, *slits))
+    return Piece(piece.ids, flat, energy, length, (*piece.slits, *slits))
+
+
+def polished(piece: Piece, total_area: float, config: ContactConfig) -> Piece:
+    """The piece after more SLIM, where that leaves it valid and lowers its energy; holes stay as they are."""
+    surface = piece.flat.surface
+    holes = sorted_loops(surface)[1:]
+    if holes or piece.energy <= 0.0 or len(surface.faces) > config.polished_faces:
+        return piece
+    uv = slim(surface, piece.flat.uv, config.polish)
+    energy = excess_energy(surface, uv) / total_area if np.isfinite(uv).all() else np.inf
+    if energy >= piece.energy or rim_overlaps(surface.faces, boundary_edges(surface.faces), uv):
+        return piece
+    return replace(piece, flat=Flat(surface, uv, {}), energy=energy)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
-    from ..config import ContactConfig
+    from ..finish.config import ContactConfig
 
 
 @dataclass(frozen=True)

@@ -26,13 +26,13 @@ from ...runtime.mesh import Surface
 from ..config import FinishConfig
 from ..finish.contact import Relaxed, excess_energy, relax
 from ..finish.disks import cut_open
-from ..finish.finish import Finished, verify
 from ..finish.flatten import circle_map
-from ..finish.labels import connected_pieces, dual_graph
 from ..finish.pieces import Piece, border_length
-from ..finish.regroup import Regrouping
-from ..finish.relief import Flat, Slit, relieve, slit_along
-from ..finish.surrogate import simplified
+from ..finish.slits import Flat, Slit, slit_along, slit_where_it_pays
+from ..search.charts import Finished, verify
+from ..search.labels import connected_pieces, dual_graph
+from ..search.proxy import simplified
+from ..search.search import Search
 from ..workers import parallel_map
 from .conformal import ConformalConfig, conformal_steps, is_valid
 from .seams import SeamConfig, seam_edges, tears
@@ -40,8 +40,8 @@ from .seams import SeamConfig, seam_edges, tears
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..finish.finish import Stage
-    from ..finish.labels import DualGraph
+    from ..search.charts import Stage
+    from ..search.labels import DualGraph
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class GlobalFinishConfig:
     seam: SeamConfig = field(default_factory=SeamConfig)
     """From the band to seam edges."""
     finish: FinishConfig = field(default_factory=FinishConfig)
-    """Flattening and relief, as for charts."""
+    """Flattening and slits, as for charts."""
     proxy_faces: int = 5000
     """Faces of the simplified disk on which slits are tried."""
     slits: int = 24
@@ -116,8 +116,9 @@ def finish_global(
     pieces = sorted((piece for found, _ in done for piece in found), key=lambda piece: int(piece.ids.min()))
     stage("exact check")
     verify(pieces)
-    price = config.finish.relief.price
-    return GlobalFinish(Finished(pieces, sum(piece.cost(price) for piece in pieces)), [row for _, row in done])
+    price = config.finish.slit.price
+    cost = sum(piece.cost(price) for piece in pieces)
+    return GlobalFinish(Finished(pieces, cost, {"parts": len(done)}, ()), [row for _, row in done])
 
 
 def finish_component(
@@ -137,7 +138,7 @@ def finish_component(
     row: dict[str, Any] = {"faces": len(ids), "seam_length": seam, "slits": len(slits)}
     flat, row["start"] = flattened(opened, slits, config)
     if flat is None:
-        search = Regrouping(surface, graph, config.finish)
+        search = Search(surface, graph, config.finish)
         search.add_valid(ids)
         return list(search.pieces.values()), {**row, "charts": len(search.pieces)}
     energy = excess_energy(flat.surface, flat.uv) / total
@@ -166,9 +167,9 @@ def find_slits(disk: Surface, total_area: float, config: GlobalFinishConfig) -> 
     start = circle_start(proxy) if len(loops) == 1 else None
     if start is None:
         return ()
-    relief = replace(config.finish.relief, most=config.slits, failures=config.failures)
+    slit = replace(config.finish.slit, most=config.slits, failures=config.failures)
     flat = Flat(proxy, *lowest(proxy, {"circle": start}, config)[1])
-    return relieve(flat, total_area, relief)[1]
+    return slit_where_it_pays(flat, total_area, slit)[1]
 
 
 def flattened(opened: LearnedDisk, slits: tuple[Slit, ...], config: GlobalFinishConfig) -> tuple[Flat | None, str]:
@@ -176,7 +177,7 @@ def flattened(opened: LearnedDisk, slits: tuple[Slit, ...], config: GlobalFinish
 
     None and "none" where neither start is valid.
     """
-    disk = slit_along(opened.surface, slits, config.finish.relief)
+    disk = slit_along(opened.surface, slits, config.finish.slit)
     circle, learned = circle_start(disk), learned_start(opened, config)
     starts = {} if circle is None else {"circle": circle}
     if learned is not None:  # a slit leaves the flattening as it is: both sides take the uv of their vertex
@@ -185,7 +186,7 @@ def flattened(opened: LearnedDisk, slits: tuple[Slit, ...], config: GlobalFinish
     if not starts:
         return None, "none"
     name, state = lowest(disk, starts, config)
-    return Flat(disk, conformal_steps(disk, state.uv, config.conformal, config.finish.relief.contact), {}), name
+    return Flat(disk, conformal_steps(disk, state.uv, config.conformal, config.finish.slit.contact), {}), name
 
 
 def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: GlobalFinishConfig) -> tuple[str, Relaxed]:
@@ -194,7 +195,7 @@ def lowest(disk: Surface, starts: dict[str, NDArray[np.float64]], config: Global
     Any of them may end in an overlap that contacts hardly loosen, so each is tried as it is and after conformal steps:
     straight from a circle, isometric energy mostly unfolds long strips over each other.
     """
-    contact = replace(config.finish.relief.contact, steps=config.steps)
+    contact = replace(config.finish.slit.contact, steps=config.steps)
 
     def tried(start: tuple[str, bool]) -> Relaxed:
         name, spread = start

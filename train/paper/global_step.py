@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 from torch import Tensor
 
-from ..learn.losses import cosine_gap, position_gap, weighted_mean
+from .gaps import cosine_gap, position_gap, weighted_mean
 from .losses import angle_gap, box_side, eigenvalue_gap, nearest_gap, repulsion, weighted_total
 from .neighbours import Neighbourhood, own_neighbours
 

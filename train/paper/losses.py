@@ -1,7 +1,7 @@
 """The paper's losses, one value per element.   n points · p charts · t triangles · e edges · j neighbours.
 
-Reduction is that of `learn.losses.weighted_mean`, and the weights of the terms are put to them in `weighted_total`,
-each in one place.  Points and normals of the cycle use `learn.losses.position_gap` and `cosine_gap`.  Roots that vanish
+Reduction is that of `gaps.weighted_mean`, and the weights of the terms are put to them in `weighted_total`,
+each in one place.  Points and normals of the cycle use `gaps.position_gap` and `cosine_gap`.  Roots that vanish
 at the optimum are rounded off by a stated ε², so every gradient is finite there.
 """
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from ..learn.losses import cosine_gap, position_gap, weighted_mean
+from .gaps import cosine_gap, position_gap, weighted_mean
 from .losses import box_side, edge_gap, edge_score, eigenvalue_gap, nearest_gap, repulsion, weighted_total
 from .neighbours import Neighbourhood, chart_neighbours
 

@@ -20,8 +20,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import leaky_relu
 
-from ..learn.networks import Dense
 from .config import PaperNets
+from .dense import Dense
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,9 +19,9 @@ from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_ar
 from ...runtime.mesh import Charts, Frame, Surface
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
-from ..finish.finish import finish
 from ..pipeline import Trained, as_charts, in_turn
 from ..sampling import sample_surface
+from ..search.charts import chart_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
 from .seams import SeamConfig, cut_points, tears
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.progress import Progress
-    from ..finish.finish import Finished
+    from ..search.charts import Finished
     from .checkpoint import Checkpoints
     from .config import PaperConfig
     from .networks import PaperNetworks
@@ -102,7 +102,8 @@ def finish_learned(
         found = finish_global(ball, uv[:, 0], stage, finishing)
         return found.finished, {**report, "components": found.components}
     report = {"raw": raw_charts(ball, logits, uv)}
-    return finish(ball, lambda xyz: learned(xyz)[0], config.charts, finishing.finish, stage), report
+    found = chart_surface(ball, config.charts, finishing.finish, config.seed, stage, lambda xyz: learned(xyz)[0])
+    return found, report
 
 
 def vertex_normals(surface: Surface) -> NDArray[np.float64]:
@@ -197,7 +198,7 @@ def finished_figures(surface: Surface, charts: Charts, finished: Finished) -> di
     return {name: found[name] for name in (*names, "flipped_faces", "overlap_fraction")} | {
         "patches": len(charts.patch_chart),
         "objective": finished.objective,
-        "slit_length": sum(piece.slits for piece in finished.pieces),
+        "slit_length": sum(piece.slit_length for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.geometry.cutgraph import (
+    FLAT_SURCHARGE,
     closing_edges,
     closing_paths,
     crease_sharpness,
@@ -36,7 +37,9 @@ def flat_grid(columns: int, rows: int) -> Surface:
 def test_the_shortest_way_over_a_grid_runs_along_its_diagonals() -> None:
     grid = flat_grid(4, 4)
     table = edge_table(grid.faces)
-    paths = shortest_paths(25, table.edges, edge_costs(grid, table, 0.0), np.array([0]))
+    ends = grid.vertices[table.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    paths = shortest_paths(25, table.edges, length, np.array([0]))
     assert paths.distance[24] == pytest.approx(4.0 * np.sqrt(2.0))
     assert paths.distance[23] == pytest.approx(3.0 * np.sqrt(2.0) + 1.0)
     path = trace_back(paths.parent, 24)
@@ -67,15 +70,26 @@ def test_boundary_edges_are_on_no_cut() -> None:
     assert table.edges[mask].tolist() == [[6, 7]]
 
 
-def test_an_edge_costs_its_length_and_a_crease_a_fifth_of_it() -> None:
+def test_an_edge_costs_its_length_a_crease_a_fifth_of_it_and_a_flat_face_much_more() -> None:
     cube = sample("cube", 8)
     table = edge_table(cube.faces)
     ends = cube.vertices[table.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     crease = (np.abs(ends.mean(axis=1)) > 0.5 - 1e-9).sum(axis=1) == 2
     assert crease.sum() == 12 * 2
-    assert edge_costs(cube, table, 0.0) == pytest.approx(length)
-    assert edge_costs(cube, table, 0.8) == pytest.approx(np.where(crease, 0.2 * length, length))
+    flat = FLAT_SURCHARGE * length
+    assert edge_costs(cube, table, 0.0) == pytest.approx(np.where(crease, length, flat))
+    assert edge_costs(cube, table, 0.8) == pytest.approx(np.where(crease, 0.2 * length, flat))
+    ball = sample("sphere", 24)
+    table = edge_table(ball.faces)
+    ends = ball.vertices[table.edges]
+    assert edge_costs(ball, table, 0.0) == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+def test_the_border_of_a_flat_sheet_costs_its_length() -> None:
+    grid = flat_grid(2, 2)
+    table = edge_table(grid.faces)
+    assert edge_costs(grid, table, 0.8)[table.boundary] == pytest.approx(1.0)
 
 
 def test_pruning_keeps_loops_and_drops_what_leads_nowhere() -> None:

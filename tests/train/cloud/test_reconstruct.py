@@ -19,7 +19,7 @@ from flexpara.runtime.pack.packing import pack
 from flexpara.runtime.samples import make_sample
 from flexpara.train.cloud.reconstruct import assembled, reconstruct, without_pinches
 from flexpara.train.cloud.stars import Candidates
-from flexpara.train.config import FinishConfig, FitConfig, JointConfig, StartConfig, TrainConfig
+from flexpara.train.config import FinishConfig, FitConfig, TrainConfig
 from flexpara.train.deploy.config import SampleConfig
 from flexpara.train.pipeline import train
 
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 QUICK = TrainConfig(
     charts=4,
-    start=StartConfig(samples=2000, fit_steps=30),
-    joint=JointConfig(steps=10),
     finish=FinishConfig(surrogate_faces=800, rounds=1),
     fit=FitConfig(samples=SampleConfig(per_face=1, least=1000, beside=500)),  # the networks play no part here
 )

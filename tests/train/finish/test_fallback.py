@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
-from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.config import FinishConfig
 from flexpara.train.finish.fallback import unwrapped_by_xatlas
-from flexpara.train.finish.labels import dual_graph
-from flexpara.train.finish.regroup import Regrouping
 
 
 def surface_of(name: str) -> Surface:
@@ -44,12 +40,3 @@ def test_a_chart_keeps_the_scale_of_the_surface() -> None:
     for piece in pieces:
         corner = surface.vertices[surface.faces[piece.ids]]
         np.testing.assert_allclose(piece.flat.surface.vertices[piece.flat.surface.faces], corner)
-
-
-def test_what_no_flattening_makes_valid_goes_to_xatlas(monkeypatch: pytest.MonkeyPatch) -> None:
-    surface = surface_of("sphere")
-    monkeypatch.setattr(Regrouping, "weigh", lambda *_args, **_more: None)
-    graph = dual_graph(surface, edge_table(surface.faces), 0.8)
-    search = Regrouping(surface, graph, FinishConfig(halvings=1))
-    search.add_valid(np.arange(len(surface.faces)))
-    assert_valid(list(search.pieces.values()), len(surface.faces))

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.geometry.distortion import oriented_energy
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, euler_characteristic
 from flexpara.runtime.geometry.triangles import signed_areas
@@ -26,7 +27,6 @@ from flexpara.train.finish.flatten import (
     mean_distortion,
     slim,
     sorted_loops,
-    symmetric_dirichlet,
     tutte_map,
 )
 
@@ -99,26 +99,6 @@ def test_the_jacobian_of_an_affine_map_is_its_matrix_up_to_the_choice_of_basis()
     assert np.linalg.det(found) == pytest.approx(np.linalg.det(matrix))
 
 
-def test_symmetric_dirichlet_of_a_rotation_is_one() -> None:
-    assert symmetric_dirichlet(TURN[None]) == pytest.approx([1.0])
-
-
-@pytest.mark.parametrize("scale", [0.1, 0.5, 2.0, 10.0])
-def test_symmetric_dirichlet_of_a_scale(scale: float) -> None:
-    assert symmetric_dirichlet(scale * TURN[None]) == pytest.approx([(scale**2 + scale**-2) / 2.0])
-
-
-def test_symmetric_dirichlet_follows_the_singular_values() -> None:
-    matrix = np.random.default_rng(1).normal(size=(50, 2, 2))
-    matrix[np.linalg.det(matrix) < 0.0] = matrix[np.linalg.det(matrix) < 0.0][:, ::-1]
-    sigma = np.linalg.svd(matrix, compute_uv=False)
-    assert symmetric_dirichlet(matrix) == pytest.approx((sigma**2 + sigma**-2).sum(axis=1) / 4.0)
-
-
-def test_a_flip_and_a_collapse_are_infinitely_bad() -> None:
-    assert symmetric_dirichlet(np.stack([MIRROR, np.zeros((2, 2)), np.ones((2, 2))])).tolist() == [np.inf] * 3
-
-
 def test_mean_distortion_weighs_faces_by_their_area() -> None:
     """A square of four times the area at scale 1 beside one at scale 2."""
     vertices = np.array([[0.0, 0, 0], [4, 0, 0], [4, 2, 0], [9, 0, 0], [10, 0, 0], [10, 2, 0]])
@@ -180,7 +160,7 @@ def test_slim_lowers_the_energy_and_flips_nothing() -> None:
     start = circle_map(surface, boundary_loops(surface.faces)[0])
     few, more = slim(surface, start, 3), slim(surface, start, 10)
     assert mean_distortion(surface, start) > mean_distortion(surface, few) > mean_distortion(surface, more) > 1.0
-    assert np.isfinite(symmetric_dirichlet(jacobians(surface, more))).all()
+    assert np.isfinite(oriented_energy(jacobians(surface, more))).all()
 
 
 def test_slim_runs_on_where_it_stopped() -> None:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 CONFIG = GlobalFinishConfig()
 CONFORMAL = ConformalConfig()
-CONTACT = CONFIG.finish.relief.contact
+CONTACT = CONFIG.finish.slit.contact
 
 
 def quiet(stage: str) -> None:

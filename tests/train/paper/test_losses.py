@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 import torch
 
-from flexpara.train.learn.losses import cosine_gap, position_gap, weighted_mean
+from flexpara.train.paper.gaps import cosine_gap, position_gap, weighted_mean
 from flexpara.train.paper.losses import (
     angle_gap,
     box_side,

@@ -5,17 +5,11 @@ Splitting and merging weighs dozens of flattenings; on a few thousand faces each
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import igl
 import numpy as np
-from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import split_non_manifold_vertices
 from ...runtime.mesh import Surface
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 def simplified(surface: Surface, faces: int) -> Surface:
@@ -34,16 +28,3 @@ def simplified(surface: Surface, faces: int) -> Surface:
     solid = Surface(coarse, triangles).face_areas() > 0.0
     used, index = np.unique(triangles[solid], return_inverse=True)
     return Surface(np.ascontiguousarray(coarse[used]), index.reshape(-1, 3).astype(np.int64))
-
-
-def carry_labels(
-    coarse: Surface, label: NDArray[np.int64], surface: Surface, *, neighbours: int = 3, normal_weight: float = 0.1
-) -> NDArray[np.float64]:
-    """(f, k) share of each label among the nearest coarse faces, by (centroid, normal_weight · normal); unit ball."""
-
-    def feature(of: Surface) -> NDArray[np.float64]:
-        return np.concatenate([of.triangles.mean(axis=1), normal_weight * of.face_normals()], axis=1)
-
-    nearest = KDTree(feature(coarse)).query(feature(surface), k=neighbours)[1]
-    votes = label[np.reshape(nearest, (len(surface.faces), neighbours))]
-    return np.stack([(votes == k).mean(axis=1) for k in range(int(label.max()) + 1)], axis=1)

@@ -1,4 +1,4 @@
-"""Relief cuts: a chart that no disk can carry without stretch is slit from its border to where it hurts.
+"""Slits: a chart that no disk can carry without stretch is slit from its border to where it hurts.
 
 A cut leaves the flattening as it is (both sides keep their uv), so SLIM goes on from there and opens the slit.
 Lengths and areas are shares: length / √(area of the whole surface), area / (area of the whole surface).
@@ -10,19 +10,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import KDTree
 
+from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.mesh import Surface
 from .contact import Relaxed, excess_energy, relax
+from .curvature import Curvature, foretold_energy
 from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
-from .flatten import jacobians, symmetric_dirichlet
+from .flatten import jacobians
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from ..config import ContactConfig, ReliefConfig
+    from .config import ContactConfig, SlitConfig
 
 
 class Flat(NamedTuple):
@@ -46,8 +49,8 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
     faces, count = flat.surface.faces, len(flat.surface.vertices)
     areas = flat.surface.face_areas()
     mass = np.bincount(faces.reshape(-1), np.repeat(areas, 3), minlength=count)
-    energy = np.minimum(symmetric_dirichlet(jacobians(flat.surface, flat.uv)) - 1.0, 10.0)
-    squeezed = np.linalg.det(jacobians(flat.surface, flat.uv)) < 1.0
+    jacobian = jacobians(flat.surface, flat.uv)
+    energy, squeezed = excess(oriented_energy(jacobian)), np.linalg.det(jacobian) < 1.0
     load = np.bincount(faces.reshape(-1), np.repeat(areas * energy * squeezed, 3), minlength=count)
     ends = flat.surface.vertices[table.edges]
     spacing = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
@@ -63,10 +66,14 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
 
 
 class Slit(NamedTuple):
-    """A cut inside a piece, by its ends in space: from a border vertex to an inner one."""
+    """A cut inside a piece, by its points in space (n, 3): from a border vertex to an inner one."""
 
-    start: NDArray[np.float64]
-    target: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+    @property
+    def length(self) -> float:
+        """Length of the polyline, in source units."""
+        return float(np.linalg.norm(self.points[1:] - self.points[:-1], axis=1).sum())
 
 
 def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
@@ -76,7 +83,7 @@ def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
     return Flat(Surface(flat.surface.vertices[old], faces), flat.uv[old], pins)
 
 
-def border_paths(surface: Surface, table: EdgeTable, sources: NDArray[np.int64], config: ReliefConfig) -> ShortestPaths:
+def border_paths(surface: Surface, table: EdgeTable, sources: NDArray[np.int64], config: SlitConfig) -> ShortestPaths:
     """Cheapest ways from the source vertices (b,) to each vertex."""
     cost = edge_costs(surface, table, config.crease_discount)
     return shortest_paths(len(surface.vertices), table.edges, cost, sources)
@@ -99,7 +106,7 @@ def most_stressed(
     return target if pressure[target] > 0.0 else None
 
 
-def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: ReliefConfig) -> Iterator[list[int]]:
+def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: SlitConfig) -> Iterator[list[int]]:
     """Ways from the border to a vertex: the cheapest, then one from elsewhere, which unrolls to the other side."""
     border = np.unique(table.edges[table.edge_count == 1])
     sources = border
@@ -124,24 +131,38 @@ def path_length(surface: Surface, path: list[int]) -> float:
     return float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum())
 
 
-def slit_along(surface: Surface, slits: tuple[Slit, ...], config: ReliefConfig) -> Surface:
+def slit_along(surface: Surface, slits: tuple[Slit, ...], config: SlitConfig) -> Surface:
     """The piece with slits made elsewhere: between the vertices nearest to their ends, in their order."""
     flat = Flat(surface, np.zeros((len(surface.vertices), 2)), {})
-    for start, target in slits:
+    for slit in slits:
         table = edge_table(flat.surface.faces)
         border = np.unique(table.edges[table.edge_count == 1])
         points = flat.surface.vertices
-        gap = np.linalg.norm(points[border] - start, axis=1)
+        gap = np.linalg.norm(points[border] - slit.points[0], axis=1)
         # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
-        paths = border_paths(flat.surface, table, border[gap <= gap.min()], config)
+        cost = edge_costs(flat.surface, table, config.crease_discount) * detour(points[table.edges], slit)
+        paths = shortest_paths(len(points), table.edges, cost, border[gap <= gap.min()])
         # the border itself is no way to cut along: the path leaves it where it last touches it
-        path = trace_back(paths.parent, int(np.linalg.norm(points - target, axis=1).argmin()))
+        path = trace_back(paths.parent, int(np.linalg.norm(points - slit.points[-1], axis=1).argmin()))
         on_border = np.flatnonzero(np.isin(path, border))
-        flat = slit_to(flat, path[: int(on_border[0]) + 1] if len(on_border) else path, table)
+        path = path[: int(on_border[0]) + 1] if len(on_border) else path
+        if len(path) > 1:
+            flat = slit_to(flat, path, table)
     return flat.surface
 
 
-def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, tuple[Slit, ...]]:
+def detour(edges: NDArray[np.float64], slit: Slit) -> NDArray[np.float64]:
+    """(e,) ≥ 1: how much dearer edges (e, 2, 3) are the farther they lie from a slit, in steps of its own points."""
+    step = slit.length / max(len(slit.points) - 1, 1)
+    if step <= 0.0:
+        return np.ones(len(edges))
+    t = np.linspace(0.0, 1.0, 4, endpoint=False)[None, :, None]
+    along = (slit.points[:-1, None] * (1.0 - t) + slit.points[1:, None] * t).reshape(-1, 3)
+    distance = KDTree(np.concatenate([along, slit.points[-1:]])).query(edges.mean(axis=1))[0]
+    return 1.0 + (distance / step) ** 2
+
+
+def slit_where_it_pays(flat: Flat, total_area: float, config: SlitConfig) -> tuple[Flat, tuple[Slit, ...]]:
     """The piece with every slit that pays, and those slits.
 
     A slit pays where it lowers the excess by more than ``config.price`` times its length.  Greedy: slit to the most
@@ -170,7 +191,7 @@ def relieve(flat: Flat, total_area: float, config: ReliefConfig) -> tuple[Flat, 
 
 
 def best_slit(
-    flat: Flat, table: EdgeTable, target: int, energy: float, total_area: float, config: ReliefConfig
+    flat: Flat, table: EdgeTable, target: int, energy: float, total_area: float, config: SlitConfig
 ) -> tuple[Flat, Slit] | None:
     """The first way to slit to a vertex that pays; ``energy`` is the piece's share of excess before."""
     for path in candidate_paths(flat.surface, table, target, config):
@@ -178,6 +199,64 @@ def best_slit(
         needed = energy - config.price * max(length, config.shortest)
         trial = slit_to(flat, path, table).relaxed(config.contact, goal=needed * total_area)
         if excess_energy(trial.surface, trial.uv) < needed * total_area:
-            points = flat.surface.vertices
-            return trial, Slit(points[path[-1]], points[target])
+            return trial, Slit(flat.surface.vertices[path[::-1]])
     return None
+
+
+def foreseen_slits(surface: Surface, total_area: float, config: SlitConfig) -> tuple[Surface, tuple[Slit, ...]]:
+    """The disk with the slits that its curvature asks for before anything is flattened, and those slits.
+
+    Greedy: slit to the vertex that a conformal map would squeeze most, as long as the energy foretold falls by
+    ``config.sure`` times what the slit costs.  To fix u = 0 along a path is to open it: all are cut at the end.
+    """
+    unit, count = float(np.sqrt(total_area)), len(surface.vertices)
+    table = edge_table(surface.faces)
+    cost = edge_costs(surface, table, config.crease_discount)
+    rim = border_of(table, count)
+    curvature = Curvature.of(surface)
+    u = curvature.factor(rim)
+    energy = foretold_energy(surface, u) / total_area
+    paths: list[list[int]] = []
+    spared: list[NDArray[np.float64]] = []
+    while len(spared) < config.failures and len(paths) < config.foreseen and energy > config.price * config.shortest:
+        ways = shortest_paths(count, table.edges, cost, np.flatnonzero(rim))
+        tip = lowest_factor(surface, u, ways.distance, spared, config.near * unit)
+        if tip is None:
+            break
+        path = trace_back(ways.parent, tip)
+        wider = rim.copy()
+        wider[path] = True
+        trial = curvature.factor(wider)
+        left = foretold_energy(surface, trial) / total_area
+        length = path_length(surface, path) / unit
+        if energy - left < config.sure * config.price * max(length, config.shortest):
+            spared.append(surface.vertices[tip])
+            continue
+        rim, u, energy = wider, trial, left
+        paths.append(path)
+    if not paths:
+        return surface, ()
+    faces, old = cut_open(surface.faces, path_mask(table, paths), table)
+    return Surface(surface.vertices[old], faces), tuple(Slit(surface.vertices[path[::-1]]) for path in paths)
+
+
+def border_of(table: EdgeTable, count: int) -> NDArray[np.bool_]:
+    """(v,) bool: the vertex lies on the border."""
+    border = np.zeros(count, dtype=bool)
+    border[table.edges[table.edge_count == 1]] = True
+    return border
+
+
+def lowest_factor(
+    surface: Surface,
+    u: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    spared: list[NDArray[np.float64]],
+    near: float,
+) -> int | None:
+    """The vertex of lowest u, at least ``near`` off the border and 2 · near off spared points; None where u ≥ 0."""
+    pressure = np.where(np.isfinite(distance) & (distance >= near), -u, 0.0)
+    for point in spared:
+        pressure[np.linalg.norm(surface.vertices - point, axis=1) < 2.0 * near] = 0.0
+    tip = int(pressure.argmax())
+    return tip if pressure[tip] > 0.0 else None

@@ -7,11 +7,12 @@ from itertools import product
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.cutgraph import FLAT_SURCHARGE
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import LabelConfig
-from flexpara.train.finish.labels import (
+from flexpara.train.search.labels import (
     DualGraph,
     border_lengths,
     connected_pieces,
@@ -58,11 +59,14 @@ def least_energy(choices: list[tuple[int, ...]], unary: np.ndarray, graph: DualG
     return min(label_energy(np.array(label), unary, graph) for label in product(*choices))
 
 
-def test_two_flat_triangles_share_one_edge_at_its_full_length() -> None:
-    graph = graph_of(hinge(0.0), crease_discount=0.8)
+@pytest.mark.parametrize(("angle", "cost"), [(0.0, 2.0 * FLAT_SURCHARGE), (1e-3, 2.0)])
+def test_two_triangles_share_one_edge_whose_seam_costs_its_length_or_more_within_a_flat_face(
+    angle: float, cost: float
+) -> None:
+    graph = graph_of(hinge(angle), crease_discount=0.8)
     assert graph.pairs.tolist() == [[0, 1]]
     assert graph.length == pytest.approx([2.0])
-    assert graph.cost == pytest.approx([2.0])
+    assert graph.cost == pytest.approx([cost], rel=1e-5)
 
 
 @pytest.mark.parametrize(("degrees", "share"), [(30.0, (1.0 - np.sqrt(0.75)) / 0.5), (60.0, 1.0), (90.0, 1.0)])

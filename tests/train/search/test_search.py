@@ -1,0 +1,190 @@
+"""The search: objective by hand, merges and splits on a tube and a sphere, limits kept, every state valid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.mesh import Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.config import FinishConfig
+from flexpara.train.finish.pieces import Piece
+from flexpara.train.search import search as module
+from flexpara.train.search.labels import connected_pieces, dual_graph
+from flexpara.train.search.search import Search
+
+CONFIG = FinishConfig()
+
+
+def unit(name: str, resolution: int) -> Surface:
+    """A sample at area 1."""
+    surface = Surface(*make_sample(name, resolution=resolution))
+    return Surface(surface.vertices / np.sqrt(surface.face_areas().sum()), surface.faces)
+
+
+def search_of(surface: Surface, label: np.ndarray | None = None, config: FinishConfig = CONFIG) -> Search:
+    """A search that begins with one piece for each connected part of a label."""
+    search = Search(surface, dual_graph(surface, edge_table(surface.faces), 0.8), config)
+    if label is not None:
+        piece = connected_pieces(label, search.graph)
+        for number in range(int(piece.max()) + 1):
+            search.add_valid(np.flatnonzero(piece == number))
+    return search
+
+
+def bands(surface: Surface, count: int) -> np.ndarray:
+    """(f,) about equal bands across z."""
+    height = surface.triangles.mean(axis=1)[:, 2]
+    edges = np.linspace(height.min(), height.max(), count + 1)[1:-1]
+    return np.searchsorted(edges, height)
+
+
+def assert_valid(search: Search) -> None:
+    covered = np.sort(np.concatenate([piece.ids for piece in search.pieces.values()]))
+    assert np.array_equal(covered, np.arange(len(search.surface.faces)))
+    for piece in search.pieces.values():
+        uv = piece.flat.uv[piece.flat.surface.faces]
+        assert not flipped_triangles(uv).any()
+        assert len(overlapping_pairs(uv)) == 0
+
+
+def test_the_objective_of_a_tube_in_two_halves_is_the_price_of_its_seams() -> None:
+    tube = unit("tube", 25)  # 16 rows: the halves meet along a circle
+    search = search_of(tube, bands(tube, 2))
+    around = 25 * 2.0 * 0.5 * np.sin(np.pi / 25)
+    scale = 1.0 / np.sqrt(around * 2.0)
+    (border,) = search.borders().values()
+    assert border == pytest.approx(around * scale, rel=1e-6)
+    slits = sum(piece.slit_length for piece in search.pieces.values())
+    assert slits == pytest.approx(2.0 * scale, rel=1e-6)
+    assert search.objective() == pytest.approx(search.energy() + CONFIG.slit.price * (border + slits))
+    assert search.energy() < 1e-4
+
+
+def test_labels_name_the_piece_of_each_face() -> None:
+    tube = unit("tube", 24)
+    search = search_of(tube, bands(tube, 3))
+    for key, piece in search.pieces.items():
+        assert (search.label()[piece.ids] == key).all()
+
+
+def test_merging_the_bands_of_a_tube_leaves_one_piece_and_saves_the_seams() -> None:
+    tube = unit("tube", 24)
+    search = search_of(tube, bands(tube, 4))
+    before = search.objective()
+    search.merge(0.0, 0)
+    assert len(search.pieces) == 1
+    assert search.objective() < before
+    assert_valid(search)
+
+
+def test_a_merge_gains_what_the_objective_says() -> None:
+    sphere = unit("sphere", 24)
+    search = search_of(sphere, bands(sphere, 4))
+    before, merge = search.objective(), search.best_merge(-np.inf)
+    assert merge is not None
+    search.apply_merge(merge)
+    assert before - search.objective() == pytest.approx(merge.gain, abs=1e-9)
+    assert_valid(search)
+
+
+def test_a_split_gains_what_the_objective_says() -> None:
+    sphere = unit("sphere", 24)
+    search = search_of(sphere, np.zeros(len(sphere.faces), dtype=np.int64))
+    key, piece = next(iter(search.pieces.items()))
+    before, split = search.objective(), search.best_split(piece)
+    assert split is not None
+    search.apply_split(key, split[1])
+    assert before - search.objective() == pytest.approx(split[0], abs=1e-9)
+    assert_valid(search)
+
+
+def test_a_pair_is_flattened_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    tube = unit("tube", 24)
+    search = search_of(tube, bands(tube, 3))
+    search.best_merge(-np.inf)
+    monkeypatch.setattr(module, "try_piece", None)
+    assert search.best_merge(-np.inf) is not None
+
+
+def test_an_excluded_piece_takes_no_part_in_a_merge() -> None:
+    tube = unit("tube", 24)
+    search = search_of(tube, bands(tube, 3))
+    middle = int(search.label()[bands(tube, 3) == 1][0])
+    assert search.best_merge(-np.inf, frozenset({middle})) is None
+
+
+def test_what_curvature_foretells_of_a_merge_orders_what_flattening_finds() -> None:
+    sphere = unit("sphere", 48)
+    search = search_of(sphere, bands(sphere, 6))
+    pairs = list(search.borders())
+    search.try_merges(pairs)
+    found = [(search.foretell(pair), piece.cost(search.price)) for pair in pairs if (piece := search.tried[pair])]
+    foretold, cost = np.array(found).T
+    assert np.corrcoef(np.argsort(np.argsort(foretold)), np.argsort(np.argsort(cost)))[0, 1] > 0.5
+
+
+@pytest.mark.parametrize(("name", "most"), [("sphere", 1), ("torus", 3), ("cube", 8), ("cloth", 8)])
+def test_a_search_ends_valid_within_its_limit_and_no_dearer_than_it_began(name: str, most: int) -> None:
+    surface = unit(name, 16)
+    search = search_of(surface, bands(surface, 4))
+    before = search.objective()
+    search.run(most, 2)
+    assert_valid(search)
+    assert len(search.pieces) <= most or search.energy() <= CONFIG.most_excess
+    if most == 8:
+        assert search.objective() <= before + 1e-9
+
+
+def test_a_piece_of_too_much_stretch_is_split_whatever_the_limit() -> None:
+    sphere = unit("sphere", 24)
+    config = replace(CONFIG, most_excess=1e-4)
+    search = search_of(sphere, bands(sphere, 2), config)
+    search.run(2, 2)
+    assert len(search.pieces) > 2
+    assert_valid(search)
+
+
+def test_faces_that_overlap_as_one_piece_are_cut_until_they_do_not() -> None:
+    cube = unit("cube", 20)
+    search = search_of(cube, np.zeros(len(cube.faces), dtype=np.int64))
+    assert len(search.pieces) > 1
+    assert_valid(search)
+    assert {piece.method for piece in search.pieces.values()} <= {"slim", "slit"}
+
+
+def test_what_no_flattening_makes_valid_goes_to_xatlas(monkeypatch: pytest.MonkeyPatch) -> None:
+    sphere = unit("sphere", 12)
+    monkeypatch.setattr(module, "try_piece", lambda *_args, **_more: None)
+    search = search_of(sphere, np.zeros(len(sphere.faces), dtype=np.int64), replace(CONFIG, halvings=1))
+    assert_valid(search)
+    assert {piece.method for piece in search.pieces.values()} == {"xatlas"}
+
+
+def test_a_piece_that_stretches_too_much_to_start_from_is_cut() -> None:
+    sphere = unit("sphere", 24)
+    whole = np.zeros(len(sphere.faces), dtype=np.int64)
+    found = search_of(sphere).try_piece(np.arange(len(sphere.faces)))
+    assert isinstance(found, Piece)
+    strict = replace(CONFIG, bearable=0.5 * found.energy)
+    assert len(search_of(sphere, whole, strict).pieces) > len(search_of(sphere, whole).pieces)
+
+
+def test_slits_are_made_where_they_pay_and_only_in_dear_pieces() -> None:
+    cone = unit("cone", 32)
+    config = replace(CONFIG, slit=replace(CONFIG.slit, foreseen=0))
+    search = search_of(cone, np.zeros(len(cone.faces), dtype=np.int64), config)
+    (before,) = search.pieces.values()
+    assert before.slit_length == 0.0
+    search.slit_all(2.0 * before.energy)
+    assert next(iter(search.pieces.values())) is before
+    search.slit_all(0.0)
+    (after,) = search.pieces.values()
+    assert after.cost(search.price) < before.cost(search.price)
+    assert_valid(search)

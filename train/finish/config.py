@@ -1,0 +1,69 @@
+"""The numbers of slits, and of taking overlap apart, in frozen dataclasses saved with each result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class ContactConfig:
+    """Taking overlap inside a chart apart."""
+
+    rounds: int = 10
+    """Rounds of pinning, SLIM and the exact test."""
+    iterations: int = 2
+    """SLIM iterations a round."""
+    block: int = 3
+    """SLIM iterations between two looks at the energy."""
+    unfolding: int = 12
+    """Rigid steps in which a first flattening has to lose its flips."""
+    polish: int = 10
+    """SLIM iterations that a finished chart gets at the end."""
+    polished_faces: int = 20000
+    """Faces above which a chart gets none: an iteration takes seconds there, and gains little."""
+    blocks: int = 10
+    """Blocks at most."""
+    still: float = 0.1
+    """A block that lowers the energy by less than this share ends the run."""
+    patience: float = 3.0
+    """How many more drops like the last one a block is trusted with."""
+    step: int = 3
+    """SLIM iterations between two tests where contacts are needed."""
+    steps: int = 5
+    """Such steps at most."""
+    margin: float = 0.01
+    """How far outside the other border a buried vertex is drawn, as a share of √(chart area)."""
+    weight: float = 10.0
+    """Weight of the pins against the distortion energy."""
+    most: float = 0.5
+    """Share of the boundary that may be buried before the case is given up."""
+
+
+@dataclass(frozen=True)
+class SlitConfig:
+    """Slits inside charts.  Lengths are shares of √(surface area)."""
+
+    price: float = 0.003
+    """Mean excess energy (symmetric Dirichlet − 1, share of the surface's area) that a slit of length 1 has to save."""
+    radius: float = 0.03
+    """Neighbourhood over which stress is averaged."""
+    shortest: float = 0.1
+    """Slits shorter than this are judged as if they had this length."""
+    near: float = 0.03
+    """No slit aims at a vertex closer to the border than this."""
+    ways: int = 1
+    """Ways to the same vertex that are tried."""
+    apart: float = 0.6
+    """How far from the first way's start the second must start, as a share of its length."""
+    failures: int = 3
+    """Slits that may fail to pay before a chart is left as it is."""
+    most: int = 12
+    """Slits a chart may get."""
+    foreseen: int = 24
+    """Slits a chart may get before it is flattened, where its curvature asks for them."""
+    sure: float = 4.0
+    """Foretold energy that such a slit has to save, as a multiple of what it costs."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """How a slit that folds over itself is held apart."""
+    crease_discount: float = 0.8
+    """How much cheaper a slit is along a sharp crease, in [0, 1)."""

@@ -1,0 +1,115 @@
+"""As-rigid-as-possible flattening: each triangle's own rotation and one sparse solve, in turn, factorized once.
+
+Sorkine & Alexa 2007; Liu et al. 2008 (A local/global approach to mesh parameterization).  v vertices · f faces.
+uv in the surface's units.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from ...runtime.geometry.overlap import flipped_triangles
+from .curvature import factorize
+from .flatten import jacobians
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Surface
+
+PIN = 1e-6
+"""Weight that holds one vertex in place, as a share of the mean diagonal: the energy leaves the whole's place open."""
+
+
+class RigidSteps:
+    """The local and global steps for one piece."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        self.areas = surface.face_areas()
+        self.gradient = gradient(surface)
+        weight = np.r_[self.areas, self.areas]
+        matrix = (self.gradient.T @ sparse.diags_array(weight) @ self.gradient).tocsr()
+        pin = sparse.coo_array(([PIN * matrix.diagonal().mean()], ([0], [0])), shape=matrix.shape)
+        self.solver = factorize((matrix + pin).tocsr())
+
+    def solve(self, turn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Uv (v, 2) whose Jacobians are nearest to rotations turn (f, 2, 2), weighted by area."""
+        target = np.concatenate([turn[:, :, 0], turn[:, :, 1]]) * np.r_[self.areas, self.areas][:, None]
+        return self.solver.solve(np.ascontiguousarray(self.gradient.T @ target))
+
+    def run(self, turn: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+        """Uv (v, 2) after ``steps`` from rotations turn (f, 2, 2)."""
+        uv = self.solve(turn)
+        for _ in range(steps - 1):
+            uv = self.solve(nearest_rotations(jacobians(self.surface, uv)))
+        return uv
+
+
+def gradient(surface: Surface) -> sparse.csr_array:
+    """(2f, v): derivatives along the two axes of each face, as ``flatten.jacobians`` takes them; first axes first."""
+    corner, faces = surface.triangles, surface.faces
+    e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    length = np.maximum(np.linalg.norm(e1, axis=1), 1e-300)
+    height = np.maximum(np.linalg.norm(np.cross(e1, e2), axis=1) / length, 1e-300)
+    along = np.einsum("fc,fc->f", e1, e2) / length
+    row, shape = np.arange(len(faces)), (len(faces), len(surface.vertices))
+    slope = along / length / height
+    columns = np.concatenate([faces[:, 0], faces[:, 1]])
+    first = sparse.coo_array((np.r_[-1.0 / length, 1.0 / length], (np.r_[row, row], columns)), shape=shape)
+    values = np.r_[slope - 1.0 / height, -slope, 1.0 / height]
+    second = sparse.coo_array((values, (np.r_[row, row, row], faces.T.reshape(-1))), shape=shape)
+    return sparse.csr_array(sparse.vstack([first, second]))
+
+
+def nearest_rotations(jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(f, 2, 2) the rotation nearest to each Jacobian, also where that is flipped; the identity for a zero."""
+    cosine = jacobian[:, 0, 0] + jacobian[:, 1, 1]
+    sine = jacobian[:, 1, 0] - jacobian[:, 0, 1]
+    size = np.hypot(cosine, sine)
+    cosine, sine = np.where(size > 0.0, cosine, 1.0), np.where(size > 0.0, sine, 0.0)
+    size = np.where(size > 0.0, size, 1.0)
+    return np.stack([np.stack([cosine, -sine], axis=1), np.stack([sine, cosine], axis=1)], axis=1) / size[:, None, None]
+
+
+def unfolded(surface: Surface, uv: NDArray[np.float64], steps: int) -> NDArray[np.float64] | None:
+    """Uv without flips, from one with some, by rigid steps and then by evening out around those left.
+
+    None where ``steps`` of either don't suffice.
+    """
+    rigid = RigidSteps(surface)
+    for _ in range(steps):
+        uv = rigid.solve(nearest_rotations(jacobians(surface, uv)))
+        if not np.isfinite(uv).all():
+            return None
+        if not flipped_triangles(uv[surface.faces]).any():
+            return uv
+    return evened_out(surface.faces, uv, steps)
+
+
+def evened_out(faces: NDArray[np.int64], uv: NDArray[np.float64], steps: int) -> NDArray[np.float64] | None:
+    """Uv without flips: vertices of flipped faces (f, 3) inside the piece go to the mean of their neighbours.
+
+    Each step looks a ring further around what is still flipped.  None where ``steps`` don't suffice.
+    """
+    count = len(uv)
+    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    links = sparse.csr_array((np.ones(len(start)), (start, end)), shape=(count, count))
+    border = np.unique(np.concatenate((links - links.T).nonzero()))
+    links = (links + links.T > 0).astype(np.float64)
+    mean = sparse.diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links
+    loose = np.zeros(count, dtype=bool)
+    for _ in range(steps):
+        flipped = flipped_triangles(uv[faces])
+        if not flipped.any():
+            return uv
+        loose[faces[flipped]] = True
+        loose[faces[loose[faces].any(axis=1)]] = True
+        loose[border] = False
+        uv = uv.copy()
+        for _ in range(steps):
+            uv[loose] = (mean @ uv)[loose]
+    return None if flipped_triangles(uv[faces]).any() else uv

@@ -1,0 +1,1 @@
+"""Which faces become one chart: parts, flat regions unfolded exactly, a search by splitting, merging and slitting."""

@@ -1,0 +1,327 @@
+"""From a surface to valid charts: part by part, exactly where unfolding is exact, else by the best of several searches.
+
+Valid means: each chart a flattened disk (holes allowed), no flipped triangle, no overlap, by exact tests.
+f faces · a part has area 1.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...runtime.errors import FinishError
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
+from ...runtime.mesh import Surface
+from ..finish.contact import excess_energy
+from ..finish.fallback import unwrapped_by_xatlas
+from ..finish.pieces import Piece, border_length, extract
+from ..finish.slits import Flat
+from ..workers import parallel_map
+from .carry import carried_back
+from .develop import Development, unfold
+from .labels import dual_graph
+from .parts import Part, split_parts
+from .planar import flat_regions
+from .proxy import simplified
+from .search import Search
+from .slivers import steadied
+from .starts import clusters, pieces_by_score
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from ..config import FinishConfig
+    from .labels import DualGraph
+
+    Stage = Callable[[str], None]
+    Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+class Finished(NamedTuple):
+    """Valid charts in the order of their first face.
+
+    pieces: by chart.  objective: what the search lowered.  parts: how many there are, those that are copies of others,
+    and by which way the rest were charted.  notes: sentences on what a user may not expect.
+    """
+
+    pieces: list[Piece]
+    objective: float
+    parts: dict[str, int]
+    notes: tuple[str, ...]
+
+
+class Solved(NamedTuple):
+    """Charts of one part, at area 1, and how they were found: "unfolded" or "searched"."""
+
+    pieces: list[Piece]
+    way: str
+
+
+def chart_surface(
+    surface: Surface, charts: int, config: FinishConfig, seed: int, stage: Stage, scores: Scores | None = None
+) -> Finished:
+    """Valid charts of a surface.
+
+    Args:
+        surface: welded, any units; edges that are not manifold are cut.
+        charts: the most charts a part gets, unless fewer than it needs to keep its stretch within bounds.
+        config: numbers.
+        seed: of the searches' first labels.
+        stage: called with the name of each stage as it begins.
+        scores: (n, 3) points in the surface's units → (n, k) log chart probabilities, learned elsewhere: the one start
+            of each search.  None starts from geometry.
+
+    Raises:
+        FinishError: the result failed the exact check (a defect).
+    """
+    stage("parts")
+    parts = split_parts(surface, config.congruence)
+    total = sum(part.scale**2 for part in parts)
+    stage("charts")
+    first = [number for number, part in enumerate(parts) if part.copy_of < 0]
+
+    def solve(number: int) -> Solved:
+        part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
+        starts = Starts(part, charts, part.scale**2 / total, config, seed, scores)
+        return solve_part(part.surface, charts, starts, config)
+
+    largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
+    solved = dict(zip(largest_first, parallel_map(solve, largest_first), strict=True))
+    pieces = [
+        placed(piece, part, surface, total)
+        for number, part in enumerate(parts)
+        for piece in solved[part.copy_of if part.copy_of >= 0 else number].pieces
+    ]
+    pieces.sort(key=lambda piece: int(piece.ids.min()))
+    stage("exact check")
+    verify(pieces)
+    ways = Counter(found.way for found in solved.values())
+    facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
+    return Finished(pieces, objective(surface, pieces, config.slit.price), facts, notes(solved, charts, config))
+
+
+def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple[str, ...]:
+    """What a user may not expect of the parts' charts, a sentence each."""
+    found = []
+    many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts]
+    if many:
+        found.append(
+            f"{len(many)} of {len(solved)} different parts got more than {charts} charts (up to {max(many)}), since "
+            f"fewer would stretch them by more than {1.0 + config.most_excess:g} on the mean"
+        )
+    stretched = [sum(piece.energy for piece in part.pieces) for part in solved.values()]
+    if max(stretched) > config.most_excess:
+        found.append(
+            f"{sum(excess > config.most_excess for excess in stretched)} of {len(solved)} different parts keep a mean "
+            f"stretch of up to {1.0 + max(stretched):.3g}; a smaller --charts does not help, a cleaner mesh may"
+        )
+    resort = sum(piece.resort != "" for part in solved.values() for piece in part.pieces)
+    if resort:
+        found.append(f"{resort} charts were flattened by xatlas, where our own flattening found nothing valid")
+    return tuple(found)
+
+
+def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
+    """A chart of a part, or of the one it is a copy of, as a chart of the whole surface."""
+    ids = part.ids[piece.ids]
+    uv, faces = piece.flat.uv * part.scale, piece.flat.surface.faces
+    if part.mirrored:
+        uv, faces = uv * [-1.0, 1.0], faces[:, [0, 2, 1]]
+    vertices = np.zeros((len(uv), 3))
+    corner = faces if not part.mirrored else piece.flat.surface.faces[:, [0, 2, 1]]
+    vertices[corner.reshape(-1)] = surface.triangles[ids].reshape(-1, 3)
+    share = part.scale**2 / total
+    return replace(
+        piece,
+        ids=ids,
+        flat=Flat(Surface(vertices, faces), uv, {}),
+        energy=piece.energy * share,
+        slit_length=piece.slit_length * float(np.sqrt(share)),
+        slits=(),
+    )
+
+
+def objective(surface: Surface, pieces: list[Piece], price: float) -> float:
+    """Σ energy + price · (seams + slits), lengths in √(area of the surface)."""
+    label = np.zeros(len(surface.faces), dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        label[piece.ids] = number
+    table = edge_table(surface.faces)
+    seam = table.manifold & (label[table.edge_faces[:, 0]] != label[table.edge_faces[:, 1]])
+    ends = surface.vertices[table.edges[seam]]
+    border = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / np.sqrt(surface.face_areas().sum()))
+    return sum(piece.cost(price) for piece in pieces) + price * border
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where the searches of a part begin.  share: of the whole surface's area, which decides how long is searched."""
+
+    part: Part
+    charts: int
+    share: float
+    config: FinishConfig
+    seed: int
+    scores: Scores | None
+
+    @property
+    def faces(self) -> int:
+        """Faces of the simplified twin."""
+        most = self.config.surrogate_faces
+        plain = int(np.clip(most * np.sqrt(self.share), min(self.config.fewest_faces, most), most))
+        return max(plain, self.config.faces_per_handle * self.handles)
+
+    @cached_property
+    def handles(self) -> int:
+        """The genus of the part."""
+        faces = self.part.surface.faces
+        return max((2 - len(boundary_loops(faces)) - euler_characteristic(faces)) // 2, 0)
+
+    @property
+    def small(self) -> bool:
+        """Whether the part is a small share of the surface."""
+        return self.share < self.config.start.worth
+
+    @property
+    def counts(self) -> tuple[float, ...]:
+        """Clusters of each start, as a multiple of the charts asked for."""
+        start = self.config.start
+        if self.handles > start.handles:
+            return start.counts_holed
+        return start.counts_small if self.small else start.counts
+
+    def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
+        """Connected pieces (f,), numbered 0…, of the twin, one start after the other."""
+        config = self.config
+        if self.scores is not None:
+            points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
+            yield pieces_by_score(self.scores(points), surface.face_areas(), graph, config.labels)
+            return
+        for number, each in enumerate(counts):
+            wanted = max(round(each * self.charts), round(self.handles / config.handles_per_cluster), 1)
+            count = min(wanted, max(len(surface.faces) // config.start.least_faces, 1))
+            yield clusters(surface, graph, count, config, np.random.default_rng([self.seed, number]))
+
+
+def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
+    """Charts of a connected manifold of area 1."""
+    exact = unfolded_part(surface, charts, config)
+    if exact is not None and exact.way == "unfolded":
+        return exact
+    whole = exact is not None and len(surface.faces) <= config.whole_faces
+    coarse = surface if whole else simplified(surface, starts.faces)
+    found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
+    if coarse is not surface:
+        found = carried_back(surface, coarse, found, charts, config)
+    found.slit_all(config.slit_above, contacts=True)
+    found.polish()
+    if exact is not None and rank_of(exact.pieces, surface, charts, config) <= rank(found, charts, config):
+        return exact
+    pieces = list(found.pieces.values())
+    if found.energy() > config.most_excess:
+        resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
+        if sum(piece.energy for piece in resort) < found.energy():
+            return Solved(resort, "xatlas")
+    return Solved(pieces, "searched")
+
+
+def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
+    """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
+    graph = dual_graph(surface, edge_table(surface.faces), config.labels.crease_discount)
+    searches = []
+    rounds = config.few_rounds if starts.small else config.rounds
+    if unfolded:
+        search = Search(surface, graph, config)
+        for piece in unfolded:
+            search.add(piece)
+        search.run(charts, rounds)
+        searches.append(search)
+    searches += searched(surface, graph, starts, starts.counts, charts, rounds)
+    if starts.small and min(search.energy() for search in searches) > config.most_excess:
+        searches += searched(surface, graph, starts, config.start.counts, charts, rounds)
+    return min(searches, key=lambda search: rank(search, charts, config))
+
+
+def searched(
+    surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...], charts: int, rounds: int
+) -> list[Search]:
+    """A finished search from each start."""
+    found = []
+    for label in starts.labels(surface, graph, counts):
+        search = Search(surface, graph, starts.config)
+        for piece in range(int(label.max()) + 1):
+            search.add_valid(np.flatnonzero(label == piece))
+        search.run(charts, rounds)
+        found.append(search)
+    return found
+
+
+def rank_of(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
+    """`rank` of charts that no search has made."""
+    energy = sum(piece.energy for piece in pieces)
+    return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)
+
+
+def rank(search: Search, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
+    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
+    return search.energy() > config.most_excess, len(search.pieces) > charts, search.objective()
+
+
+def unfolded_part(surface: Surface, charts: int, config: FinishConfig) -> Solved | None:
+    """A part made of flat facets, unfolded: "unfolded" where that is the answer, "facets" where it is one among others.
+
+    None where too little of it is flat.
+    """
+    table = edge_table(surface.faces)
+    region = flat_regions(surface, table, config.planar)
+    count = int(region.max()) + 1
+    if count > config.planar.most:
+        return None
+    found = unfold(surface, table, region, config.planar)
+    faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
+    answer = len(found) <= min(config.planar.few, charts) or (faceted and len(found) <= charts)
+    pieces = [as_piece(surface, development) for development in found]
+    if not all(is_valid(piece) for piece in pieces):
+        return None
+    return Solved(pieces, "unfolded" if answer else "facets")
+
+
+def as_piece(surface: Surface, development: Development) -> Piece:
+    """A development as a piece: its corners are one vertex where they are in space and in the plane."""
+    corner = surface.faces[development.ids].reshape(-1)
+    uv = development.uv.reshape(-1, 2)
+    order = np.lexsort((uv[:, 1], uv[:, 0], corner))
+    fresh = np.ones(len(order), dtype=bool)
+    fresh[1:] = (corner[order][1:] != corner[order][:-1]) | (uv[order][1:] != uv[order][:-1]).any(axis=1)
+    index = np.zeros(len(order), dtype=np.int64)
+    index[order] = np.cumsum(fresh) - 1
+    first = order[fresh]
+    flat = Flat(Surface(surface.vertices[corner[first]], index.reshape(-1, 3)), uv[first], {})
+    whole = extract(surface, development.ids)
+    slits = (border_length(flat.surface) - border_length(whole)) / 2.0
+    return Piece(development.ids, flat, excess_energy(flat.surface, flat.uv), slits)
+
+
+def verify(pieces: list[Piece]) -> None:
+    """The exact check of each piece: raises FinishError where a triangle is flipped or two overlap."""
+    for number, piece in enumerate(pieces):
+        uv = piece.flat.uv[piece.flat.surface.faces]
+        flips, overlaps = int(flipped_triangles(uv).sum()), len(overlapping_pairs(uv))
+        if flips or overlaps:
+            raise FinishError(
+                f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping "
+                "pairs, expected none; please report the mesh"
+            )
+
+
+def is_valid(piece: Piece) -> bool:
+    """True for a piece without flips and overlap, by the exact tests."""
+    uv = piece.flat.uv[piece.flat.surface.faces]
+    return not flipped_triangles(uv).any() and len(overlapping_pairs(uv)) == 0

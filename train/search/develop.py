@@ -1,0 +1,235 @@
+"""Unfolding without stretch: flat regions are hinged together along shared edges while nothing overlaps.
+
+A *development* is a set of faces with the uv of each corner, isometric to the surface.  Two developments join along an
+edge they share: one is turned and moved until the edge coincides; every further shared edge that then coincides too is
+joined with it.  So a box becomes a cross, the side of a cylinder a rectangle, that of a cone a sector.
+f faces · uv in the units of the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.triangles import signed_areas
+from .planar import plane_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ...runtime.geometry.topology import EdgeTable
+    from ...runtime.mesh import Surface
+    from ..config import PlanarConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Development:
+    """Faces laid flat.  ids (m,) int64, ascending; uv (m, 3, 2); perimeter: of its border, joined edges left out."""
+
+    ids: NDArray[np.int64]
+    uv: NDArray[np.float64]
+    perimeter: float
+
+
+class Hinge(NamedTuple):
+    """How a second development joins a first: its uv once moved (m, 3, 2), and the edges (h,) that then coincide."""
+
+    uv: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    length: float
+
+
+class Unfolding:
+    """Developments of one surface on their way to be joined, and which of its edges are joined already."""
+
+    def __init__(self, surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig) -> None:
+        self.surface, self.table, self.config = surface, table, config
+        ends = surface.vertices[table.edges]
+        self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
+        self.owner = region.copy()
+        self.members = {number: self._flat(ids) for number, ids in enumerate(grouped(region))}
+        self._next = len(self.members)
+
+    def _flat(self, ids: NDArray[np.int64]) -> Development:
+        """One flat region in its own plane."""
+        uv = plane_of(self.surface, ids).project(self.surface.triangles[ids].reshape(-1, 3)).reshape(-1, 3, 2)
+        edges, count = np.unique(self.table.face_edges[ids], return_counts=True)
+        return Development(ids, uv, float(self.length[edges[count == 1]].sum()))
+
+    def shared_edges(self) -> dict[tuple[int, int], NDArray[np.int64]]:
+        """Manifold edges between two developments, by the pair of them, lower first."""
+        candidates = np.flatnonzero(self.table.manifold)
+        pair = np.sort(self.owner[self.table.edge_faces[candidates]], axis=1)
+        apart = pair[:, 0] != pair[:, 1]
+        candidates, pair = candidates[apart], pair[apart]
+        order = np.lexsort((candidates, pair[:, 1], pair[:, 0]))
+        candidates, pair = candidates[order], pair[order]
+        first = np.ones(len(pair), dtype=bool)
+        first[1:] = (pair[1:] != pair[:-1]).any(axis=1)
+        groups = np.split(candidates, np.flatnonzero(first)[1:]) if len(pair) else []
+        return {(a, b): edges for (a, b), edges in zip(pair[first].tolist(), groups, strict=True)}
+
+    def corner_uv(self, member: int, edges: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(h, 2, 2) uv of the ends (lower vertex first) of edges on the border of a development."""
+        faces = self.table.edge_faces[edges]
+        face = np.where(self.owner[faces[:, 0]] == member, faces[:, 0], faces[:, 1])
+        row = np.searchsorted(self.members[member].ids, face)
+        vertex, uv = self.surface.faces[face], self.members[member].uv[row]
+        at = np.arange(len(edges))
+        return np.stack(
+            [uv[at, (vertex == self.table.edges[edges, end, None]).argmax(axis=1)] for end in (0, 1)], axis=1
+        )
+
+    def hinges(self, first: int, second: int, edges: NDArray[np.int64]) -> Iterator[Hinge]:
+        """The ways the second development can join the first along shared edges, each way once."""
+        fixed, moving = self.corner_uv(first, edges), self.corner_uv(second, edges)
+        left = np.ones(len(edges), dtype=bool)
+        longest = max(float(self.length[edges].max()), 1e-300)
+        for at in np.argsort(-np.round(self.length[edges] / longest, self.config.digits), kind="stable").tolist():
+            if not left[at]:
+                continue
+            turn, shift = rigid_motion(moving[at], fixed[at])
+            gap = np.linalg.norm(moving @ turn.T + shift - fixed, axis=2).max(axis=1)
+            meeting = gap <= self.tolerance
+            left &= ~meeting
+            left[at] = False
+            joined = edges[meeting]
+            yield Hinge(self.members[second].uv @ turn.T + shift, joined, float(self.length[joined].sum()))
+
+    def best_hinge(self, first: int, second: int, edges: NDArray[np.int64]) -> tuple[float, Hinge]:
+        """The way that joins the greatest share of the shorter border: (share, hinge)."""
+        shorter = max(min(self.members[first].perimeter, self.members[second].perimeter), 1e-300)
+        hinge = max(
+            self.hinges(first, second, edges), key=lambda hinge: round(hinge.length / shorter, self.config.digits)
+        )
+        return hinge.length / shorter, hinge
+
+    def joined(self, first: int, second: int, hinge: Hinge) -> Development | None:
+        """Both as one development; None where it would overlap itself or sprawl."""
+        a, b = self.members[first], self.members[second]
+        uv = self._welded(a, b.ids, hinge)
+        both = np.concatenate([a.uv, uv])
+        if flipped_triangles(uv).any() or fill(both) < self.config.fill or self._overlap(a.uv, uv):
+            return None
+        ids = np.concatenate([a.ids, b.ids])
+        order = np.argsort(ids)
+        return Development(ids[order], both[order], a.perimeter + b.perimeter - 2.0 * hinge.length)
+
+    def _welded(self, a: Development, ids: NDArray[np.int64], hinge: Hinge) -> NDArray[np.float64]:
+        """The moved uv with the ends of joined edges exactly where the first development has them."""
+        uv = hinge.uv.copy()
+        for edge in hinge.edges.tolist():
+            face = self.table.edge_faces[edge]
+            row = np.searchsorted(a.ids, face)
+            inside = (row < len(a.ids)) & (a.ids[np.minimum(row, len(a.ids) - 1)] == face)
+            kept, other = face[inside][0], face[~inside][0]
+            for vertex in self.table.edges[edge].tolist():
+                place = a.uv[np.searchsorted(a.ids, kept), np.flatnonzero(self.surface.faces[kept] == vertex)[0]]
+                corner = np.flatnonzero(self.surface.faces[other] == vertex)[0]
+                before = hinge.uv[np.searchsorted(ids, other), corner]
+                same = (self.surface.faces[ids] == vertex) & (np.abs(hinge.uv - before).max(axis=2) <= self.tolerance)
+                uv[same] = place
+        return uv
+
+    def _overlap(self, fixed: NDArray[np.float64], moved: NDArray[np.float64]) -> bool:
+        """True where a moved triangle overlaps a fixed one; only those within the other's bounding box can."""
+        low = np.maximum(fixed.min(axis=(0, 1)), moved.min(axis=(0, 1)))
+        high = np.minimum(fixed.max(axis=(0, 1)), moved.max(axis=(0, 1)))
+        near = [uv[((uv.max(axis=1) > low) & (uv.min(axis=1) < high)).all(axis=1)] for uv in (fixed, moved)]
+        return len(overlapping_pairs(np.concatenate(near))) > 0 if all(len(part) for part in near) else False
+
+    def replace(self, first: int, second: int, whole: Development) -> int:
+        """Two developments become one, under a new number."""
+        del self.members[first], self.members[second]
+        self.members[self._next] = whole
+        self.owner[whole.ids] = self._next
+        self._next += 1
+        return self._next - 1
+
+
+def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig) -> list[Development]:
+    """Flat regions (f,) joined into developments, the pair that shares most of its border first.
+
+    Two join where the shared edges are at least ``config.shared`` of the shorter border.
+    """
+    state = Unfolding(surface, table, region, config)
+    around: dict[int, dict[int, NDArray[np.int64]]] = {number: {} for number in state.members}
+    for (a, b), edges in state.shared_edges().items():
+        around[a][b] = around[b][a] = edges
+    queue = [entry for a, beside in around.items() for b in beside if a < b and (entry := ranked(state, a, b, around))]
+    heapify(queue)
+    while queue:
+        _, first, second = heappop(queue)
+        if first not in state.members or second not in state.members:
+            continue
+        edges = around[first][second]
+        joined = state.joined(first, second, state.best_hinge(first, second, edges)[1])
+        if joined is None:
+            continue
+        number = state.replace(first, second, joined)
+        around[number] = combined(around, first, second, number)
+        for other in around[number]:
+            if entry := ranked(state, other, number, around):
+                heappush(queue, entry)
+    return sorted(state.members.values(), key=lambda found: int(found.ids[0]))
+
+
+def ranked(
+    state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
+) -> tuple[float, int, int] | None:
+    """(−share of the shorter border, pair) of two developments that share enough of it, else None."""
+    share, _ = state.best_hinge(first, second, around[first][second])
+    return (-round(share, state.config.digits), first, second) if share >= state.config.shared else None
+
+
+def combined(
+    around: dict[int, dict[int, NDArray[np.int64]]], first: int, second: int, number: int
+) -> dict[int, NDArray[np.int64]]:
+    """The shared edges of two developments that became one, by neighbour; the neighbours are told its number."""
+    beside: dict[int, NDArray[np.int64]] = {}
+    for old in (first, second):
+        for other, edges in around.pop(old).items():
+            if other in (first, second):
+                continue
+            beside[other] = np.sort(np.concatenate([beside[other], edges])) if other in beside else edges
+            del around[other][old]
+    for other, edges in beside.items():
+        around[other][number] = edges
+    return beside
+
+
+def grouped(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Rows of each label 0, 1, …, ascending."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(label))[:-1])
+
+
+def rigid_motion(
+    moving: NDArray[np.float64], fixed: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The turn (2, 2) and shift (2,) that bring one segment (2, 2) onto another: midpoint on midpoint."""
+    a, b = moving[1] - moving[0], fixed[1] - fixed[0]
+    cosine, sine = a @ b, a[0] * b[1] - a[1] * b[0]
+    size = max(float(np.hypot(cosine, sine)), 1e-300)
+    turn = np.array([[cosine, -sine], [sine, cosine]]) / size
+    return turn, fixed.mean(axis=0) - turn @ moving.mean(axis=0)
+
+
+def fill(uv: NDArray[np.float64]) -> float:
+    """Share of the least rectangle around triangles (m, 3, 2) that they cover; it lies along a side of their hull."""
+    points = uv.reshape(-1, 2)
+    hull = points[ConvexHull(points).vertices]
+    sides = np.stack([b - a for a, b in pairwise([*hull, hull[0]])])
+    angle = np.arctan2(sides[:, 1], sides[:, 0])
+    turn = np.stack([np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)], 1)
+    box = np.ptp(np.einsum("sij,nj->sni", turn, hull), axis=1).prod(axis=1).min()
+    return float(np.abs(signed_areas(uv)).sum() / max(float(box), 1e-300))

@@ -1,0 +1,103 @@
+"""The parts of a surface: what manifold edges join, each at a size of its own, and which of them are copies.
+
+Every part is charted at area 1, so that a ball of radius 0.1 gets the same charts as one of radius 10.  A part that is
+another one moved, turned or mirrored is not charted again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
+from ...runtime.mesh import Surface
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class Part(NamedTuple):
+    """Faces that hang together.
+
+    ids: (m,) int64 of the surface, ascending.  surface: those faces at area 1 around their mean, a manifold.
+    scale: lengths there × scale are lengths of the whole surface.  origin: (3,) its place there.
+    copy_of: number of the part it is a copy of, or −1; mirrored: whether that copy is a mirror image.
+    """
+
+    ids: NDArray[np.int64]
+    surface: Surface
+    scale: float
+    origin: NDArray[np.float64]
+    copy_of: int = -1
+    mirrored: bool = False
+
+
+def split_parts(surface: Surface, tolerance: float) -> list[Part]:
+    """The parts of a surface, numbered by their lowest face.
+
+    Args:
+        surface: any welded surface; it is cut at edges that are not manifold.
+        tolerance: distance, as a share of the part's size, up to which the vertices of a copy coincide.
+    """
+    faces, old = split_non_manifold_vertices(surface.faces)
+    table = edge_table(faces)
+    component = face_components(len(faces), table.edge_faces[table.manifold])
+    order = np.argsort(component, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(component))[:-1])
+    parts: list[Part] = []
+    known: dict[bytes, list[int]] = {}
+    for ids in groups:
+        part = extracted(surface.vertices[old], faces, ids)
+        for mirrored in (False, True):
+            key = pattern(part.surface.faces, mirrored=mirrored)
+            twin = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
+            if twin >= 0:
+                part = part._replace(copy_of=twin, mirrored=mirrored)
+                break
+        if part.copy_of < 0:
+            known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(len(parts))
+        parts.append(part)
+    return parts
+
+
+def extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], ids: NDArray[np.int64]) -> Part:
+    """Faces ids (m,) as a surface of area 1 around its mean, its vertices numbered as its faces first name them."""
+    corner = faces[ids].reshape(-1)
+    used, first, index = np.unique(corner, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.zeros(len(used), dtype=np.int64)
+    rank[order] = np.arange(len(used))
+    points = vertices[used[order]]
+    origin = points.mean(axis=0)
+    points = points - origin
+    renumbered = rank[index].reshape(-1, 3)
+    area = float(Surface(points, renumbered).face_areas().sum())
+    extent = float(np.ptp(points, axis=0).max())
+    scale = float(np.sqrt(area)) if area > 0.0 else (extent or 1.0)
+    return Part(ids, Surface(points / scale, renumbered), scale, origin)
+
+
+def pattern(faces: NDArray[np.int64], *, mirrored: bool) -> bytes:
+    """The connectivity of a part whose vertices are numbered as faces name them; of its mirror image where asked."""
+    if mirrored:
+        turned = faces[:, [0, 2, 1]].reshape(-1)
+        used, first, index = np.unique(turned, return_index=True, return_inverse=True)
+        rank = np.zeros(len(used), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(used))
+        faces = rank[index].reshape(-1, 3)
+    return faces.astype(np.int32).tobytes()
+
+
+def is_copy(first: Part, second: Part, tolerance: float, *, mirrored: bool) -> bool:
+    """True where one motion (with a reflection, where mirrored) brings each corner onto its like."""
+    if len(first.ids) != len(second.ids):
+        return False
+    a = first.surface.triangles
+    b = second.surface.triangles[:, [0, 2, 1]] if mirrored else second.surface.triangles
+    a, b = a.reshape(-1, 3), b.reshape(-1, 3)
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    u, _, v = np.linalg.svd(b.T @ a)
+    sign = np.array([1.0, 1.0, (-1.0 if mirrored else 1.0) * np.sign(np.linalg.det(u @ v))])
+    gap = np.abs(b @ (u * sign) @ v - a).max(initial=0.0)
+    return bool(gap <= tolerance * float(np.ptp(a, axis=0).max(initial=0.0)))

@@ -1,0 +1,90 @@
+"""Flat regions of a surface: faces joined across edges that do not bend.   f faces · r regions.
+
+Two faces lie in one plane where the angle between their normals is below what rounding the vertices to float32 can do
+to it.  A region is then checked as a whole: a finely divided curved surface bends little at each edge, and much in all.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...runtime.geometry.topology import face_components
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.geometry.topology import EdgeTable
+    from ...runtime.mesh import Surface
+    from ..config import PlanarConfig
+
+FLOAT32_STEP = 2.0**-24
+"""Relative rounding of a coordinate that was stored as float32."""
+
+
+class Plane(NamedTuple):
+    """An orthonormal frame: origin (3,), axes (2, 3); the normal is axes[0] × axes[1]."""
+
+    origin: NDArray[np.float64]
+    axes: NDArray[np.float64]
+
+    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) points → (n, 2) coordinates in the plane."""
+        return (points - self.origin) @ self.axes.T
+
+
+def flat_regions(surface: Surface, table: EdgeTable, config: PlanarConfig) -> NDArray[np.int64]:
+    """(f,) number of the flat region of each face, numbered by the lowest face; a region is connected.
+
+    Faces of a region that turns out to be curved as a whole are regions of their own.
+    """
+    normals, extent = surface.face_normals(), float(np.ptp(surface.vertices, axis=0).max())
+    pairs = table.edge_faces[table.manifold]
+    sine = np.linalg.norm(np.cross(normals[pairs[:, 0]], normals[pairs[:, 1]]), axis=1)
+    facing = np.einsum("ec,ec->e", normals[pairs[:, 0]], normals[pairs[:, 1]]) > 0.0
+    height = heights(surface)
+    noise = config.rounding * FLOAT32_STEP * extent / np.maximum(height[pairs].min(axis=1), 1e-300)
+    allowed = np.clip(noise, config.angle, config.largest_angle)
+    region = face_components(len(surface.faces), pairs[facing & (sine <= allowed)])
+    curved = deviations(surface, region) > config.deviation * extent
+    lonely = curved[region]
+    count = int(region.max(initial=-1)) + 1
+    region = np.where(lonely, count + np.arange(len(region)), region)
+    first = np.unique(region, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first[1]))
+    return rank[first[2]].astype(np.int64)
+
+
+def heights(surface: Surface) -> NDArray[np.float64]:
+    """(f,) least height of each triangle: twice its area over its longest side."""
+    corner = surface.triangles
+    longest = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max(axis=1)
+    return 2.0 * surface.face_areas() / np.maximum(longest, 1e-300)
+
+
+def deviations(surface: Surface, region: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(r,) greatest distance of a region's vertices from its plane: at its area centroid, across its mean normal."""
+    count = int(region.max(initial=-1)) + 1
+    cross, centroid = surface.face_cross(), surface.triangles.mean(axis=1)
+    area = surface.face_areas()
+    weight = np.maximum(np.bincount(region, area, minlength=count), 1e-300)
+    origin = np.stack([np.bincount(region, area * c, minlength=count) for c in centroid.T], axis=1) / weight[:, None]
+    normal = np.stack([np.bincount(region, c, minlength=count) for c in cross.T], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    offset = np.abs(np.einsum("fic,fc->fi", surface.triangles - origin[region][:, None], normal[region])).max(axis=1)
+    greatest = np.zeros(count)
+    np.maximum.at(greatest, region, offset)
+    return greatest
+
+
+def plane_of(surface: Surface, ids: NDArray[np.int64]) -> Plane:
+    """The plane of faces ids (m,): their mean normal, and the direction of their longest edge as first axis."""
+    corner = surface.triangles[ids]
+    normal = surface.face_cross()[ids].sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+    edges = (np.roll(corner, -1, axis=1) - corner).reshape(-1, 3)
+    first = edges[np.linalg.norm(edges, axis=1).argmax()]
+    first = first - (first @ normal) * normal
+    first /= max(float(np.linalg.norm(first)), 1e-300)
+    return Plane(corner[0, 0], np.stack([first, np.cross(normal, first)]))
