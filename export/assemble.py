@@ -6,17 +6,21 @@ Positions in source units, uv in [0, 1]² of the atlas, sizes in texels.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..runtime.errors import FinishError
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Surface
-from ..runtime.pack.packing import pack
+from ..runtime.pack.packing import Packed, pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
+from ..train.config import TrainConfig
+from ..train.deploy.fit import fit_networks
+from ..train.search.recut import recut
 from .metadata import Provenance
 from .networks import export_networks
 
@@ -29,6 +33,8 @@ if TYPE_CHECKING:
     from ..train.pipeline import Trained
 
 REPORT_VERSION = 1
+RECUTS = 4
+"""Times charts that float32 can't hold are cut again; each time they lose the faces that fail."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +62,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     Raises: ParityError when the exported file and its networks disagree.
     """
     with clock.stage("pack"):
-        packed = pack(asset, trained.charts, size=size, padding=padding, seed=trained.settings["seed"])
+        trained, packed = _valid_atlas(asset, trained, clock, size, padding)
     atlas = packed.atlas
     with clock.stage("measure"):
         metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
@@ -81,6 +87,33 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
+
+
+def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, size: int, padding: int) -> tuple[Trained, Packed]:
+    """Packed charts that are valid as written; those that float32 could not hold are cut again, and all fitted anew.
+
+    Raises: FinishError where charts stay invalid (a defect).
+    """
+    seed = trained.settings["seed"]
+    packed = pack(asset, trained.charts, size=size, padding=padding, seed=seed)
+    for _ in range(RECUTS):
+        if len(packed.invalid) == 0:
+            return trained, packed
+        charts = recut(asset.surface, trained.charts, packed.invalid, packed.atlas.corner_uv)
+        ball = Surface(trained.frame.apply(asset.surface.vertices), asset.surface.faces)
+        networks = fit_networks(ball, charts, TrainConfig().fit, seed, clock)
+        note = (
+            f"{len(packed.invalid)} charts lost triangles too thin for the numbers of a file: each is its own chart now"
+        )
+        report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
+        trained = replace(trained, charts=charts, networks=networks, report=report)
+        packed = pack(asset, charts, size=size, padding=padding, seed=seed)
+    if len(packed.invalid):
+        raise FinishError(
+            f"{len(packed.invalid)} charts are not valid as written after {RECUTS} attempts, expected none; "
+            "please report the mesh"
+        )
+    return trained, packed
 
 
 def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[str, Any]]:

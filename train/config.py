@@ -27,7 +27,11 @@ class PlanarConfig:
     """Distance, as a share of the surface's extent, up to which two edges of a layout are one: float32's rounding."""
     shared: float = 0.1
     """Share of the shorter border that two developments must have in common to be joined."""
-    fill: float = 0.5
+    aspect: float = 8.0
+    """Long side over short side of a development that may be made of more compact ones."""
+    long_side: float = 0.4
+    """Share of the shorter border from which two are joined along a long side: then a strip may come of it."""
+    fill: float = 0.51
     """Share of the least rectangle around it that a development must cover: less wastes the texture."""
     most: int = 2000
     """Flat regions of a part that unfolding is tried with."""

@@ -118,11 +118,17 @@ class Unfolding:
         a, b = self.members[first], self.members[second]
         uv = self._welded(a, b.ids, hinge)
         both = np.concatenate([a.uv, uv])
-        if flipped_triangles(uv).any() or fill(both) < self.config.fill or self._overlap(a.uv, uv):
+        if flipped_triangles(uv).any() or not self._is_compact(a, b, both, hinge) or self._overlap(a.uv, uv):
             return None
         ids = np.concatenate([a.ids, b.ids])
         order = np.argsort(ids)
         return Development(ids[order], both[order], a.perimeter + b.perimeter - 2.0 * hinge.length)
+
+    def _is_compact(self, a: Development, b: Development, both: NDArray[np.float64], hinge: Hinge) -> bool:
+        """Whether the two joined, uv (m, 3, 2), pack well: no sprawl, no strip unless joined along long sides."""
+        longest = max(self.config.aspect, aspect(a.uv), aspect(b.uv)) * (1.0 + 1e-9)
+        along = hinge.length >= self.config.long_side * min(a.perimeter, b.perimeter)
+        return fill(both) >= self.config.fill and (along or aspect(both) <= longest)
 
     def _welded(self, a: Development, ids: NDArray[np.int64], hinge: Hinge) -> NDArray[np.float64]:
         """The moved uv with the ends of joined edges exactly where the first development has them."""
@@ -224,12 +230,23 @@ def rigid_motion(
     return turn, fixed.mean(axis=0) - turn @ moving.mean(axis=0)
 
 
-def fill(uv: NDArray[np.float64]) -> float:
-    """Share of the least rectangle around triangles (m, 3, 2) that they cover; it lies along a side of their hull."""
+def least_rectangle(uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) sides of the rectangle of least area around triangles (m, 3, 2); it lies along a side of their hull."""
     points = uv.reshape(-1, 2)
     hull = points[ConvexHull(points).vertices]
     sides = np.stack([b - a for a, b in pairwise([*hull, hull[0]])])
     angle = np.arctan2(sides[:, 1], sides[:, 0])
     turn = np.stack([np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)], 1)
-    box = np.ptp(np.einsum("sij,nj->sni", turn, hull), axis=1).prod(axis=1).min()
-    return float(np.abs(signed_areas(uv)).sum() / max(float(box), 1e-300))
+    boxes = np.ptp(np.einsum("sij,nj->sni", turn, hull), axis=1)
+    return boxes[boxes.prod(axis=1).argmin()]
+
+
+def fill(uv: NDArray[np.float64]) -> float:
+    """Share of the least rectangle around triangles (m, 3, 2) that they cover."""
+    return float(np.abs(signed_areas(uv)).sum() / max(float(least_rectangle(uv).prod()), 1e-300))
+
+
+def aspect(uv: NDArray[np.float64]) -> float:
+    """Long side over short side of the least rectangle around triangles (m, 3, 2)."""
+    sides = least_rectangle(uv)
+    return float(sides.max() / max(float(sides.min()), 1e-300))
