@@ -128,7 +128,8 @@ class Unfolding:
         """Whether the two joined, uv (m, 3, 2), pack well: no sprawl, no strip unless joined along long sides."""
         longest = max(self.config.aspect, aspect(a.uv), aspect(b.uv)) * (1.0 + 1e-9)
         along = hinge.length >= self.config.long_side * min(a.perimeter, b.perimeter)
-        return fill(both) >= self.config.fill and (along or aspect(both) <= longest)
+        least = min(self.config.fill, fill(a.uv) * 0.999, fill(b.uv) * 0.999)  # slender triangles fill half of theirs
+        return fill(both) >= least and (along or aspect(both) <= longest)
 
     def _welded(self, a: Development, ids: NDArray[np.int64], hinge: Hinge) -> NDArray[np.float64]:
         """The moved uv with the ends of joined edges exactly where the first development has them."""
