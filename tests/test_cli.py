@@ -281,10 +281,18 @@ def test_a_defect_keeps_its_traceback(square: Path, tmp_path: Path, monkeypatch:
         main(["unwrap", str(square), "-o", str(tmp_path / "out")])
 
 
+def test_preset_fast_needs_no_torch(square: Path) -> None:
+    argv = ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview", "--quiet"]
+    code = f"import sys; sys.modules['torch'] = None; from flexpara.__main__ import main; sys.exit(main({argv!r}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=square.parent, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (square.parent / "out" / "square.onnx").exists()
+
+
 @pytest.mark.parametrize(
     ("absent", "argv", "extra"),
     [
-        ("torch", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[train]"),
+        ("torch", ["unwrap", "square.obj", "-o", "out", "--preset", "paper"], "flexpara[train]"),
         ("igl", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[train]"),
         ("moderngl", ["unwrap", "square.obj", "-o", "out", "--maps", "chart"], "flexpara[bake]"),
         ("moderngl", ["bake", "square.obj", "-o", "out", "--maps", "position"], "flexpara[bake]"),

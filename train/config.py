@@ -168,10 +168,14 @@ class FinishConfig:
     """As ``rounds``, for a part of small share."""
     most_excess: float = 0.05
     """Mean excess energy of a part above which it gets more charts than asked for."""
+    resort_excess: float = 0.1
+    """Mean excess energy of a part above which xatlas is asked too."""
     rounds: int = 8
     """Times the worst chart may be split."""
     vain_splits: int = 3
     """Charts that no split improves, before the search ends."""
+    worst_splits: int = 12
+    """Charts of most energy that are tried for a split where the stretch is out of bounds."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
     necks: int = 2

