@@ -1,4 +1,4 @@
-"""Collects what an exported file says about itself (runtime/bundle.py holds the format).
+"""Collects what an exported file says about itself (runtime/sessions/bundle.py holds the format).
 
 k charts · p patches.  Frame and placement in the units of the source file, size and padding in texels.
 """

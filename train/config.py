@@ -80,6 +80,8 @@ class StartConfig:
     """The same for a part of small share; it gets the others too, where this leaves it stretched."""
     counts_holed: tuple[float, ...] = (1.0,)
     """The same for a part of many handles."""
+    crowded: int = 60
+    """Pieces of a start that are valid by themselves above which no further start is searched."""
     handles: int = 8
     """Handles above which a part has many."""
     worth: float = 0.05
@@ -164,6 +166,8 @@ class FinishConfig:
     """Merges flattened at a time."""
     patience: int = 12
     """Merges flattened in vain before the rest, foretold worse, are believed not to pay."""
+    tries: int = 150
+    """Merges flattened in a search after which it looks at the most promising alone."""
     few_rounds: int = 2
     """As ``rounds``, for a part of small share."""
     most_excess: float = 0.05

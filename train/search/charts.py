@@ -258,8 +258,11 @@ def searched(
         search = Search(surface, graph, starts.config)
         for piece in range(int(label.max()) + 1):
             search.add_valid(np.flatnonzero(label == piece))
+        crowded = len(search.pieces) > starts.config.start.crowded
         search.run(charts, rounds)
         found.append(search)
+        if crowded:  # a search of so many pieces takes its time; another start would not be much better
+            break
     return found
 
 

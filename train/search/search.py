@@ -197,8 +197,9 @@ class Search:
         """A merge that gains more than ``least``: the best of those foretold to, a few at a time; None for none."""
         ranked = [entry for entry in self.candidates(set(excluded)) if entry[0] > least - self.config.doubt]
         untried = [n for n, entry in enumerate(ranked) if entry[1] not in self.tried]
-        if np.isfinite(least) and len(untried) > self.config.patience:
-            ranked = ranked[: untried[self.config.patience]]
+        patience = self.config.patience if len(self.tried) < self.config.tries else self.config.looks
+        if np.isfinite(least) and len(untried) > patience:
+            ranked = ranked[: untried[patience]]
         for at in range(0, len(ranked), self.config.looks):
             block = ranked[at : at + self.config.looks]
             self.try_merges([pair for _, pair, _ in block])
