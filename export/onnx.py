@@ -1,7 +1,8 @@
 """Writes torch networks as a self-describing ONNX file, once it is proven equal to them: those of preset paper.
 
 n points · p patches · k charts.  Input `points` (n, 3) float32, source units; outputs `uv` (n, 2) float32 in [0, 1]²,
-v up, `chart` (n) int64, `score` (n) float32.  Frame and packing are folded in; runtime/sessions/bundle.py's JSON is attached.
+v up, `chart` (n) int64, `score` (n) float32.  Frame and packing are folded in; the JSON of
+runtime/sessions/bundle.py is attached.
 
 Each point visits the Assign-Net and then its own patch's Unwrap-Net only: rows are gathered by patch, unwrapped, and
 scattered back.  With eight patches that is four times as fast in onnxruntime as computing all patches and choosing one.

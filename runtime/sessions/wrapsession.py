@@ -3,7 +3,7 @@
 n rows.  uv in [0, 1]², v up; points in the units of the source file; normals unit, outwards as the faces are oriented.
 
 The file is `<stem>.wrap.onnx`: `uv` (n, 2) float32 and `chart` (n) int64 → `points` (n, 3), `normals` (n, 3) float32.
-Its JSON is that of runtime/sessions/bundle.py with kind "wrap".  The graph adds the frame's centre in float32; the session sets
+Its JSON is that of sessions/bundle.py with kind "wrap".  The graph adds the frame's centre in float32; the session sets
 the graph's two centre initializers to zero and adds it in float64, so that far from the origin no precision is lost.
 """
 
