@@ -37,6 +37,8 @@ class PlanarConfig:
     """Flat regions of a part that unfolding is tried with."""
     digits: int = 6
     """Decimal digits to which shares of a border are compared: what is equal but for rounding counts as equal."""
+    most_charts: int = 48
+    """Developments of a part above which it is not made of facets: small faces of a curved surface are flat too."""
     few: int = 3
     """So many developments of a whole part, or less, are taken as they are."""
     facets: int = 24

@@ -222,9 +222,9 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
         found = carried_back(surface, coarse, found, charts, config)
     found.slit_all(config.slit_above, contacts=True)
     found.polish()
-    if exact is not None and rank_of(exact.pieces, surface, charts, config) <= rank(found, charts, config):
-        return exact
     pieces = list(found.pieces.values())
+    if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
+        return exact
     if found.energy() > config.resort_excess:
         resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
         if sum(piece.energy for piece in resort) < found.energy():
@@ -246,7 +246,7 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     searches += searched(surface, graph, starts, starts.counts, charts, rounds)
     if starts.small and min(search.energy() for search in searches) > config.most_excess:
         searches += searched(surface, graph, starts, config.start.counts, charts, rounds)
-    return min(searches, key=lambda search: rank(search, charts, config))
+    return min(searches, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
 
 
 def searched(
@@ -266,15 +266,10 @@ def searched(
     return found
 
 
-def rank_of(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
-    """`rank` of charts that no search has made."""
+def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
+    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
     energy = sum(piece.energy for piece in pieces)
     return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)
-
-
-def rank(search: Search, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
-    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
-    return search.energy() > config.most_excess, len(search.pieces) > charts, search.objective()
 
 
 def unfolded_part(surface: Surface, charts: int, config: FinishConfig) -> Solved | None:
@@ -288,6 +283,8 @@ def unfolded_part(surface: Surface, charts: int, config: FinishConfig) -> Solved
     if count > config.planar.most:
         return None
     found = unfold(surface, table, region, config.planar)
+    if len(found) > config.planar.most_charts:
+        return None
     faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
     answer = len(found) <= min(config.planar.few, charts) or (faceted and len(found) <= charts)
     pieces = [as_piece(surface, development) for development in found]
