@@ -110,6 +110,10 @@ class CarryConfig:
     """Weight of the unit normal against the position, at area 1, in that distance."""
     band: int = 4
     """Rings of faces beside a border that may change sides."""
+    worse: float = 2.0
+    """Excess energy of a carried chart, as a multiple of the proxy's, up to which it is taken at once."""
+    slack: float = 0.005
+    """Mean excess energy added to that."""
     rigid_steps: int = 4
     """Steps of as-rigid-as-possible flattening from the twin's rotations."""
 

@@ -39,16 +39,35 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
     for number in range(int(piece.max()) + 1):
         ids = np.flatnonzero(piece == number)
         source = found.pieces[int(keys[np.bincount(smooth[ids]).argmax()])]
-        carried = search.try_piece(
-            ids, source.slits, lambda disk, source=source: carried_uv(disk, source.flat, config.carry)
-        )
-        if isinstance(carried, Piece) and search.is_bearable(carried):
+        carried = carried_piece(search, ids, source, config.carry)
+        if carried is not None and search.is_bearable(carried):
             search.add(carried)
         else:
             search.add_valid(ids, source.slits)
     if len(search.pieces) > limit:
         search.merge(-np.inf, limit)
+    search.split_down()
     return search
+
+
+def carried_piece(search: Search, ids: NDArray[np.int64], source: Piece, config: CarryConfig) -> Piece | None:
+    """A chart of the proxy on the faces ids (m,): laid out as there, anew with its slits, or with slits of its own.
+
+    The first of these that stretches about as little as the proxy's chart, or the best; None where none is valid.
+    """
+    enough = config.worse * source.energy + config.slack * float(search.areas[ids].sum()) / search.area
+    best: Piece | None = None
+    for slits, start in (
+        (source.slits, lambda disk: carried_uv(disk, source.flat, config)),
+        (source.slits, None),
+        ((), None),
+    ):
+        found = search.try_piece(ids, slits, start)
+        if isinstance(found, Piece) and (best is None or found.energy < best.energy):
+            best = found
+        if best is not None and best.energy <= enough:
+            break
+    return best
 
 
 def features(surface: Surface, config: CarryConfig) -> NDArray[np.float64]:

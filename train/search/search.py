@@ -61,8 +61,6 @@ class Search:
         self.settled: set[int] = set()
         self._next = 0
 
-    # -- the state
-
     def add(self, piece: Piece) -> int:
         """Take a piece in; its key."""
         self.pieces[self._next] = piece
@@ -136,8 +134,6 @@ class Search:
     def objective(self) -> float:
         """Σ costs + price · borders."""
         return sum(piece.cost(self.price) for piece in self.pieces.values()) + self.price * sum(self.borders().values())
-
-    # -- merging
 
     def foretell(self, pair: Pair) -> float:
         """Cost of two pieces as one, by curvature: no more slits than both have."""
@@ -229,8 +225,6 @@ class Search:
             del self.pieces[key]
         return self.add(merge.piece)
 
-    # -- splitting
-
     def best_split(self, piece: Piece) -> tuple[float, list[Piece]] | None:
         """The best way found to cut a piece in two: (gain, parts)."""
         links = self.links(piece.ids)
@@ -256,8 +250,6 @@ class Search:
                 best = gain, valid
         return best
 
-    # -- the search
-
     def run(self, most: int, rounds: int) -> None:
         """Merge while that pays, then down to ``most`` pieces as far as the stretch allows, then split and merge."""
         self.merge(0.0, 0)
@@ -265,8 +257,7 @@ class Search:
         for _ in range(rounds):
             if len(self.settled) >= self.config.vain_splits or not self.improve(most):
                 break
-        while self.energy() > self.config.most_excess and self.split_worst():
-            pass
+        self.split_down()
 
     def merge(self, least: float, down_to: int) -> None:
         """Merges that gain more than ``least``, while there are more than ``down_to`` pieces."""
@@ -299,6 +290,11 @@ class Search:
                 return True
         self.settled.add(worst)
         return True
+
+    def split_down(self) -> None:
+        """Split, whatever the limit on charts, until the stretch is within bounds or no split lowers it."""
+        while self.energy() > self.config.most_excess and self.split_worst():
+            pass
 
     def split_worst(self) -> bool:
         """Split the piece of most energy, whatever the limit; False where no split lowers it."""
