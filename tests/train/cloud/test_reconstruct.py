@@ -210,7 +210,9 @@ def test_a_sphere_of_points_is_unwrapped_nearly_conformally() -> None:
     assert conformality(points, hull, uv, chart) < 0.13  # one slit ball: its areas are kept better than its angles
 
 
-@pytest.mark.parametrize(("name", "most"), [("torus", 0.06), ("trefoil", 0.15)])  # the knot has eight points around it
+@pytest.mark.parametrize(
+    ("name", "most"), [("torus", 0.13), ("trefoil", 0.15)]
+)  # in one or two charts; the knot has eight points around it
 def test_points_of_a_closed_tube_are_unwrapped_nearly_conformally(name: str, most: float) -> None:
     vertices, faces = make_sample(name, resolution=48)
     order = np.random.default_rng(16).permutation(len(vertices))
