@@ -1,8 +1,8 @@
 """One command in a process group of its own: exit code, wall and CPU seconds, peak memory, the last line of stderr.
 
-Standard library only: a process begins with the peak memory of the one that started it, so this one stays small.
-Memory is the larger of two: the greatest resident size that one process of the group had (kernel's figure), and the
-greatest sum over the group, each shared page counted once (sampled five times a second, Linux only).  MB are 2²⁰ bytes.
+Memory is the larger of two, sampled five times a second: the greatest resident size that one process of the group has
+had, and the sum over the group, each shared page counted once.  `ru_maxrss` serves only where there is no /proc: a
+process begins with the peak of the one that started it.  MB are 2²⁰ bytes.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def run(command: list[str], limit: float) -> Ended:
         code,
         seconds,
         used.ru_utime + used.ru_stime,
-        max(peak[0], used.ru_maxrss / 1024),
+        peak[0] or used.ru_maxrss / 1024,
         said[-1] if said else "",
         len(said),
     )
@@ -80,7 +80,7 @@ def end_all() -> None:
 
 
 def _watch(group: int, deadline: float, over: threading.Event, late: threading.Event, peak: list[float]) -> None:
-    """Until `over`: note the group's memory in `peak`; kill it at the deadline and set `late`."""
+    """Until `over`: note the group's peak memory in `peak`; kill it at the deadline and set `late`."""
     while not over.wait(SAMPLE_SECONDS):
         peak[0] = max(peak[0], group_memory(group))
         if perf_counter() > deadline:
@@ -97,14 +97,21 @@ def _kill(group: int) -> None:
 
 
 def group_memory(group: int) -> float:
-    """MB of all processes of a group, each shared page counted once; 0 where /proc doesn't say."""
-    total = 0
+    """MB: the sum over a group's processes now, or the peak of one of them if that is larger; 0 without /proc."""
+    total = highest = 0
     for process in Path("/proc").glob("[0-9]*"):
         try:
             if os.getpgid(int(process.name)) != group:
                 continue
-            text = (process / "smaps_rollup").read_text(encoding="ascii")
+            shared = (process / "smaps_rollup").read_text(encoding="ascii")
+            status = (process / "status").read_text(encoding="utf-8", errors="replace")
         except (OSError, ValueError):  # it has just ended
             continue
-        total += sum(int(line.split()[1]) for line in text.splitlines() if line.startswith("Pss:"))
-    return total / 1024
+        total += _kilobytes(shared, "Pss:")
+        highest = max(highest, _kilobytes(status, "VmHWM:"))
+    return max(total, highest) / 1024
+
+
+def _kilobytes(text: str, key: str) -> int:
+    """The number of a line `KEY 123 kB` of a file in /proc; 0 where there is no such line."""
+    return next((int(line.split()[1]) for line in text.splitlines() if line.startswith(key)), 0)
