@@ -15,11 +15,12 @@ from .. import __version__
 from ..runtime.errors import FinishError
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Surface
+from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import Packed, pack
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
-from ..train.config import TrainConfig
 from ..train.deploy.fit import fit_networks
+from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.search.recut import recut
 from .metadata import Provenance
 from .networks import export_networks
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from ..train.pipeline import Trained
 
 REPORT_VERSION = 1
-RECUTS = 4
-"""Times charts that float32 can't hold are cut again; each time they lose the faces that fail."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,23 +93,23 @@ def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, size: int, paddin
 
     Raises: FinishError where charts stay invalid (a defect).
     """
-    seed = trained.settings["seed"]
-    packed = pack(asset, trained.charts, size=size, padding=padding, seed=seed)
-    for _ in range(RECUTS):
+    seed, config = trained.settings["seed"], PackConfig()
+    packed = pack(asset, trained.charts, size=size, padding=padding, seed=seed, config=config)
+    for _ in range(config.recuts):
         if len(packed.invalid) == 0:
             return trained, packed
         charts = recut(asset.surface, trained.charts, packed.invalid, packed.atlas.corner_uv)
         ball = Surface(trained.frame.apply(asset.surface.vertices), asset.surface.faces)
-        networks = fit_networks(ball, charts, TrainConfig().fit, seed, clock)
+        networks = fit_networks(ball, charts, fit_in_force(trained.settings), seed, clock)
         note = (
             f"{len(packed.invalid)} charts lost triangles too thin for the numbers of a file: each is its own chart now"
         )
         report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
         trained = replace(trained, charts=charts, networks=networks, report=report)
-        packed = pack(asset, charts, size=size, padding=padding, seed=seed)
+        packed = pack(asset, charts, size=size, padding=padding, seed=seed, config=config)
     if len(packed.invalid):
         raise FinishError(
-            f"{len(packed.invalid)} charts are not valid as written after {RECUTS} attempts, expected none; "
+            f"{len(packed.invalid)} charts are not valid as written after {config.recuts} attempts, expected none; "
             "please report the mesh"
         )
     return trained, packed
@@ -127,8 +126,9 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
     from .wrap import export_wrap
 
     ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)
-    seed = found.report["settings"]["seed"]
-    model = fit_wrap(ball, found.charts, found.atlas.corner_uv, seed=seed, progress=clock)
+    settings = found.report["settings"]
+    config, seed = wrap_in_force(settings), settings["seed"]
+    model = fit_wrap(ball, found.charts, found.atlas.corner_uv, config, seed=seed, progress=clock)
     with clock.stage("export inverse"), TemporaryDirectory() as folder:
         path = Path(folder) / "atlas.wrap.onnx"
         facts = Provenance(asset.sha256, found.report["settings"], found.report["metrics"])

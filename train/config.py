@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..runtime.geometry.cutgraph import SeamPrices
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import SlitConfig
 
@@ -66,8 +67,8 @@ class LabelConfig:
 
     smoothing: float = 0.02
     """Length that a seam may save before a face leaves its most probable chart, per unit of −log probability."""
-    crease_discount: float = 0.8
-    """How much cheaper a seam is along a sharp crease, in [0, 1)."""
+    seams: SeamPrices = field(default_factory=SeamPrices)
+    """What the borders of labels cost."""
     islet_area: float = 0.008
     """Pieces below this share of the surface join a neighbour."""
 

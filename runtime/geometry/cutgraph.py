@@ -5,6 +5,7 @@ v vertices · e edges of an edge table · f faces.  Paths are lists of vertices;
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,6 +18,18 @@ if TYPE_CHECKING:
 
     from ..mesh import Surface
     from .topology import EdgeTable
+
+
+@dataclass(frozen=True)
+class SeamPrices:
+    """What a seam costs per length of the edge that it follows: 1 where nothing speaks for or against it."""
+
+    crease_discount: float = 0.8
+    """How much cheaper it is along a sharp crease, in [0, 1)."""
+    flat: float = 5e-9
+    """1 − cos of the dihedral deviation below which an edge lies inside a flat face: about 1e-4 radians."""
+    flat_price: float = 8.0
+    """What it costs through a flat face: a crease nearby is cheaper."""
 
 
 class ShortestPaths(NamedTuple):
@@ -36,24 +49,18 @@ def crease_sharpness(surface: Surface, table: EdgeTable) -> NDArray[np.float64]:
     return np.where(table.manifold, np.clip((1.0 - cosine) / 0.5, 0.0, 1.0), 0.0)
 
 
-FLAT = 5e-9
-"""1 − cos of the dihedral deviation below which an edge lies inside a flat face: about 1e-4 radians."""
-FLAT_SURCHARGE = 8.0
-"""How many times its length a cut through a flat face costs: a crease nearby is cheaper."""
-
-
-def seam_prices(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.float64]:
+def seam_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:
     """(e,) price per length of a cut along each edge: 1, down to 1 − crease_discount in creases, more in flat faces."""
     sharpness = crease_sharpness(surface, table)
-    flat = table.manifold & (sharpness * 0.5 < FLAT)
-    return np.where(flat, FLAT_SURCHARGE, 1.0 - crease_discount * sharpness)
+    flat = table.manifold & (sharpness * 0.5 < prices.flat)
+    return np.where(flat, prices.flat_price, 1.0 - prices.crease_discount * sharpness)
 
 
-def edge_costs(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.float64]:
+def edge_costs(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:
     """(e,) what a cut along each edge costs: its length times its price."""
     ends = surface.vertices[table.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return np.maximum(length * seam_prices(surface, table, crease_discount), 1e-12)
+    return np.maximum(length * seam_prices(surface, table, prices), 1e-12)
 
 
 def shortest_paths(

@@ -85,3 +85,5 @@ class PackConfig:
     place: PlaceConfig = field(default_factory=PlaceConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
+    recuts: int = 4
+    """How often charts that float32 can't hold are cut again and all are packed anew."""

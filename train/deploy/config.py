@@ -62,6 +62,8 @@ class GrowConfig:
     """Ridge of the affine maps that gates are compared by, as a share of the node's squared extent."""
     torn: float = 8.0
     """An expert that misses its samples by so many tolerances (rms) holds two sides of a slit, and takes one."""
+    steepest: float = 4.0
+    """So does one that is so many times as steep as the surface at its samples: across a crease some is needed."""
     slack: float = 1.5
     """Radius within which an expert is sure, as a multiple of the distance of its farthest sample …"""
     near: float = 0.125

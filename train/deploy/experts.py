@@ -12,9 +12,6 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-STEEP = 4.0
-"""Times the steepest slope among its samples that an expert may have: across a crease some are needed."""
-
 
 class Lesson(NamedTuple):
     """What is learned.
@@ -57,20 +54,20 @@ def fit_affine(lesson: Lesson, first: NDArray[np.int64], ridge: float) -> Fitted
     return Fitted(mean_x, mean_y, slope.transpose(0, 2, 1))
 
 
-def untorn(own: Lesson, first: NDArray[np.int64], fitted: Fitted, limit: float) -> Fitted:
+def untorn(own: Lesson, first: NDArray[np.int64], fitted: Fitted, limit: float, steepest: float) -> Fitted:
     """The maps of nodes; where one misses its samples by more than ``limit`` (rms), that of a middle sample.
 
     Such a node holds both sides of a slit: the map between them would be right on neither.  If it has few samples, it
-    shows by a map that is steeper than the surface is anywhere.
+    shows by a map that is ``steepest`` times as steep as the surface is anywhere.
     """
     count = np.diff(first, append=len(own.x))
     owner = np.repeat(np.arange(len(first)), count)
     ahead = np.einsum("nmd,nd->nm", fitted.slope[owner], own.x - fitted.mean_x[owner])
     off = ((own.y - fitted.mean_y[owner] - ahead) ** 2).sum(axis=1)
     mean_x, mean_y, slope = (part.copy() for part in fitted)
-    steepest = np.maximum.reduceat(np.abs(own.slope).max(axis=(1, 2)), first)
-    steep = np.abs(slope).max(axis=(1, 2)) > STEEP * steepest
-    for node in np.flatnonzero((np.add.reduceat(off, first) > limit**2 * count) | (steep & (steepest > 0.0))):
+    steep = np.maximum.reduceat(np.abs(own.slope).max(axis=(1, 2)), first)
+    torn = (np.abs(slope).max(axis=(1, 2)) > steepest * steep) & (steep > 0.0)
+    for node in np.flatnonzero((np.add.reduceat(off, first) > limit**2 * count) | torn):
         rows = slice(first[node], first[node] + count[node])
         middle = np.median(own.y[rows], axis=0)
         best = first[node] + int(np.linalg.norm(own.y[rows] - middle, axis=1).argmin())

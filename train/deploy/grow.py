@@ -231,7 +231,7 @@ def _assembled(
     rows, owner = rows[own], owner[own]
     order = np.argsort(owner, kind="stable")
     own, first = lesson.among(rows[order]), np.searchsorted(owner[order], np.arange(decided.expert_count))
-    fitted = untorn(own, first, fit_affine(own, first, config.ridge), config.torn * tolerance)
+    fitted = untorn(own, first, fit_affine(own, first, config.ridge), config.torn * tolerance, config.steepest)
     bias = fitted.mean_y - np.einsum("kmd,kd->km", fitted.slope, fitted.mean_x)
     away = np.linalg.norm(own.x - fitted.mean_x[owner[order]], axis=1)
     codes = np.where(decided.codes < 0, decided.gate_count - 1 - decided.codes, decided.codes).astype(np.int32)

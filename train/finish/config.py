@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ...runtime.geometry.cutgraph import SeamPrices
+
+
+@dataclass(frozen=True)
+class CotangentConfig:
+    """The cotangent weights that curvature is spread by, kept where a solve is sound."""
+
+    least_weight: float = 1e-3
+    """Least weight of an edge, so that obtuse triangles leave the solve positive definite."""
+    steepest: float = 1e4
+    """Greatest cotangent of a corner: that of a needle is cut off here."""
+
 
 @dataclass(frozen=True)
 class ContactConfig:
@@ -21,6 +33,8 @@ class ContactConfig:
     """SLIM iterations that a finished chart gets at the end."""
     polished_faces: int = 20000
     """Faces above which a chart gets none: an iteration takes seconds there, and gains little."""
+    cotangents: CotangentConfig = field(default_factory=CotangentConfig)
+    """Of the first flattening, and of what curvature foretells."""
     blocks: int = 10
     """Blocks at most."""
     still: float = 0.1
@@ -65,5 +79,5 @@ class SlitConfig:
     """Foretold energy that such a slit has to save, as a multiple of what it costs."""
     contact: ContactConfig = field(default_factory=ContactConfig)
     """How a slit that folds over itself is held apart."""
-    crease_discount: float = 0.8
-    """How much cheaper a slit is along a sharp crease, in [0, 1)."""
+    seams: SeamPrices = field(default_factory=SeamPrices)
+    """What the ways that slits take cost."""

@@ -22,11 +22,7 @@ if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
     from ...runtime.mesh import Surface
-
-LEAST_WEIGHT = 1e-3
-"""Least weight of an edge, so that obtuse triangles leave the solve positive definite."""
-STEEPEST = 1e4
-"""Greatest cotangent of a corner: that of a needle is cut off here."""
+    from .config import CotangentConfig
 
 
 class Curvature:
@@ -40,13 +36,13 @@ class Curvature:
         self.turn, self.laplacian, self.fan = turn, laplacian, fan
 
     @classmethod
-    def of(cls, surface: Surface) -> Curvature:
+    def of(cls, surface: Surface, config: CotangentConfig) -> Curvature:
         """The curvature of a surface."""
         angle, cotangent = corner_angles(surface.triangles), corner_cotangents(surface.triangles)
         turn = np.zeros(len(surface.vertices))
         np.add.at(turn, surface.faces, angle)
         fan = np.bincount(surface.faces.reshape(-1), minlength=len(surface.vertices))
-        return cls(turn, cotangent_laplacian(surface, cotangent), fan)
+        return cls(turn, cotangent_laplacian(surface, cotangent, config), fan)
 
     def inside(self, rim: NDArray[np.bool_]) -> tuple[NDArray[np.int64], SuperLU | None]:
         """The vertices that a rim (v,) bool leaves free, and the factorized laplacian over them."""
@@ -71,13 +67,13 @@ def corner_cotangents(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return cosine / np.maximum(sine, 1e-12 * (np.abs(cosine) + 1e-300))
 
 
-def cotangent_laplacian(surface: Surface, cotangent: NDArray[np.float64]) -> sparse.csr_array:
+def cotangent_laplacian(surface: Surface, cotangent: NDArray[np.float64], config: CotangentConfig) -> sparse.csr_array:
     """(v, v) positive semidefinite; weights of obtuse pairs of triangles are raised to a small positive one."""
     faces, count = surface.faces, len(surface.vertices)
     i, j = np.roll(faces, -1, axis=1).reshape(-1), np.roll(faces, -2, axis=1).reshape(-1)
-    weight = 0.5 * np.clip(cotangent.reshape(-1), -STEEPEST, STEEPEST)
+    weight = 0.5 * np.clip(cotangent.reshape(-1), -config.steepest, config.steepest)
     links = sparse.coo_array((np.r_[weight, weight], (np.r_[i, j], np.r_[j, i])), shape=(count, count)).tocsr()
-    links.data = np.maximum(links.data, LEAST_WEIGHT)
+    links.data = np.maximum(links.data, config.least_weight)
     return (sparse.diags_array(links.sum(axis=1)) - links).tocsr()
 
 
@@ -100,11 +96,11 @@ def foretold_energy(surface: Surface, u: NDArray[np.float64]) -> float:
     return float(foretold_energies(surface.faces, surface.face_areas(), u).sum())
 
 
-def border_first(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]:
+def border_first(surface: Surface, loop: NDArray[np.int64], config: CotangentConfig) -> NDArray[np.float64]:
     """Uv (v, 2) of a disk: its border loop (b,) laid out with its own lengths, the inside harmonic.  May hold flips."""
     border = np.zeros(len(surface.vertices), dtype=bool)
     border[loop] = True
-    curvature = Curvature.of(surface)
+    curvature = Curvature.of(surface, config)
     inner, solver = curvature.inside(border)
     u = np.zeros(len(surface.vertices))
     if solver is not None:

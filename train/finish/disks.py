@@ -16,17 +16,18 @@ from ...runtime.geometry.topology import EdgeTable, edge_table, split_non_manifo
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.mesh import Surface
 
 
-def disk_cuts(surface: Surface, table: EdgeTable, crease_discount: float) -> NDArray[np.bool_]:
+def disk_cuts(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.bool_]:
     """(e,) bool: edges that, cut open, leave one disk.  None for a disk.
 
     Tree-cotree: a shortest-path tree from the boundary (all loops as one source), a spanning tree of the dual graph of
     the longest loops; each edge in neither closes one short path between two boundary loops or around a handle.  A
     closed piece without handles is slit between two far points.
     """
-    cost = edge_costs(surface, table, crease_discount)
+    cost = edge_costs(surface, table, prices)
     count = len(surface.vertices)
     sources = np.unique(table.edges[table.edge_count == 1])
     closed = len(sources) == 0

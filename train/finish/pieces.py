@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     Start = Callable[[Surface], NDArray[np.float64]]
 
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ..config import FinishConfig
     from .config import ContactConfig, SlitConfig
 
@@ -93,7 +94,7 @@ def border_length(piece: Surface) -> float:
     return float(np.linalg.norm(piece.vertices[edges[:, 1]] - piece.vertices[edges[:, 0]], axis=1).sum())
 
 
-def openings(piece: Surface, crease_discount: float) -> Iterator[Surface]:
+def openings(piece: Surface, prices: SeamPrices) -> Iterator[Surface]:
     """The ways to see a piece as a disk: with its holes filled where it has no handles, and cut along short paths."""
     loops = len(boundary_loops(piece.faces))
     genus = 2 - loops - euler_characteristic(piece.faces)
@@ -101,7 +102,7 @@ def openings(piece: Surface, crease_discount: float) -> Iterator[Surface]:
         yield piece
     if genus != 0 or loops != 1:
         table = edge_table(piece.faces)
-        faces, old = cut_open(piece.faces, disk_cuts(piece, table, crease_discount), table)
+        faces, old = cut_open(piece.faces, disk_cuts(piece, table, prices), table)
         yield Surface(piece.vertices[old], faces)
 
 
@@ -116,7 +117,7 @@ def flattened(
     """
     outer, *holes = sorted_loops(piece)
     filled = fill_holes(piece, holes)
-    start = flipless_start(filled, outer, config.unfolding, given)
+    start = flipless_start(filled, outer, config, given)
     if start is None:
         return None
     uv = converge(filled, Relaxed(start, {}), goal, config)
@@ -126,18 +127,18 @@ def flattened(
 
 
 def flipless_start(
-    disk: Surface, loop: NDArray[np.int64], steps: int, given: Start | None = None
+    disk: Surface, loop: NDArray[np.int64], config: ContactConfig, given: Start | None = None
 ) -> NDArray[np.float64] | None:
     """A first uv (v, 2) of a disk without flips: near its isometry, else on the circle; None where both have flips.
 
-    ``given`` is tried before the border laid out with its own lengths; ``steps``: rigid steps to lose flips in.
+    ``given`` is tried before the border laid out with its own lengths.
     """
-    laid_out = [lambda disk: border_first(disk, loop)]
+    laid_out = [lambda disk: border_first(disk, loop, config.cotangents)]
     for start in laid_out if given is None else [given, *laid_out]:
         uv = start(disk)
         if not np.isfinite(uv).all():
             continue
-        near = unfolded(disk, uv, steps) if flipped_triangles(uv[disk.faces]).any() else uv
+        near = unfolded(disk, uv, config.unfolding) if flipped_triangles(uv[disk.faces]).any() else uv
         if near is not None:
             return near
     uv = circle_map(disk, loop)
@@ -176,7 +177,7 @@ def try_piece(
     whole = extract(surface, ids)
     unit, price = float(np.sqrt(total_area)), config.slit.price
     best: Piece | Overlapping | None = None
-    for plain in openings(whole, config.slit.crease_discount):
+    for plain in openings(whole, config.slit.seams):
         disk, more = slit_along(plain, slits, config.slit), ()
         if start is None:
             disk, more = foreseen_slits(disk, total_area, config.slit)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Surface
 
 PIN = 1e-6
-"""Weight that holds one vertex in place, as a share of the mean diagonal: the energy leaves the whole's place open."""
+"""Weight that holds one vertex in place, as a share of the mean diagonal: the energy leaves the whole's place open.
+
+No setting: any weight gives the same shape, as the pinned vertex gets there at no cost to the rest."""
 
 
 class RigidSteps:

@@ -85,7 +85,7 @@ def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
 
 def border_paths(surface: Surface, table: EdgeTable, sources: NDArray[np.int64], config: SlitConfig) -> ShortestPaths:
     """Cheapest ways from the source vertices (b,) to each vertex."""
-    cost = edge_costs(surface, table, config.crease_discount)
+    cost = edge_costs(surface, table, config.seams)
     return shortest_paths(len(surface.vertices), table.edges, cost, sources)
 
 
@@ -140,7 +140,7 @@ def slit_along(surface: Surface, slits: tuple[Slit, ...], config: SlitConfig) ->
         points = flat.surface.vertices
         gap = np.linalg.norm(points[border] - slit.points[0], axis=1)
         # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
-        cost = edge_costs(flat.surface, table, config.crease_discount) * detour(points[table.edges], slit)
+        cost = edge_costs(flat.surface, table, config.seams) * detour(points[table.edges], slit)
         paths = shortest_paths(len(points), table.edges, cost, border[gap <= gap.min()])
         # the border itself is no way to cut along: the path leaves it where it last touches it
         path = trace_back(paths.parent, int(np.linalg.norm(points - slit.points[-1], axis=1).argmin()))
@@ -211,9 +211,9 @@ def foreseen_slits(surface: Surface, total_area: float, config: SlitConfig) -> t
     """
     unit, count = float(np.sqrt(total_area)), len(surface.vertices)
     table = edge_table(surface.faces)
-    cost = edge_costs(surface, table, config.crease_discount)
+    cost = edge_costs(surface, table, config.seams)
     rim = border_of(table, count)
-    curvature = Curvature.of(surface)
+    curvature = Curvature.of(surface, config.contact.cotangents)
     u = curvature.factor(rim)
     energy = foretold_energy(surface, u) / total_area
     paths: list[list[int]] = []

@@ -22,7 +22,8 @@ from safetensors import torch as safetensors
 
 from ...runtime.errors import InputError, MissingFileError
 from ...runtime.files import replace_file
-from .config import PaperConfig, config_from_json
+from ..fromjson import from_json
+from .config import PaperConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,7 +130,7 @@ def resume(folder: Path) -> Resumed:
             f"{manifest}: no such file, expected a checkpoint; name the folder of --checkpoint-every"
         )
     facts = _read_manifest(manifest)
-    config = _checked(manifest, facts, "config", dict, config_from_json)
+    config = _checked(manifest, facts, "config", dict, lambda found: from_json(PaperConfig, found, "config"))
     step = _checked(manifest, facts, "step", int)
     if not 0 < step <= config.steps:
         raise InputError(f"{manifest}: step is {step}, expected 1 to {config.steps}; use another checkpoint")

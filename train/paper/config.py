@@ -7,8 +7,8 @@ Details" unless said otherwise); "decided" = the paper is silent, and the docstr
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from typing import Any, Literal
+from dataclasses import asdict, dataclass, field
+from typing import Literal
 
 from ...runtime.errors import InputError
 from ...runtime.options import PAPER_RANGES
@@ -176,32 +176,3 @@ def _within(name: str, value: int, least: int, most: int) -> None:
 def _finite(name: str, value: float) -> None:
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError(f"{name} is {value}, expected a finite number ≥ 0; choose another")
-
-
-def config_from_json(facts: dict[str, Any]) -> PaperConfig:
-    """The config that ``dataclasses.asdict`` made these facts of; every field must be there, and no other.
-
-    Raises:
-        InputError: a field is missing, unknown, of another type, or out of range.
-    """
-    return _from_json(PaperConfig, facts, "config")
-
-
-def _from_json(kind: type[Any], facts: Any, where: str) -> Any:
-    """A dataclass of this module from plain JSON."""
-    names = {field.name for field in fields(kind)}
-    if not isinstance(facts, dict) or set(facts) != names:
-        found = sorted(map(str, set(facts) ^ names))[:3] if isinstance(facts, dict) else type(facts).__name__
-        raise InputError(f"{where} has missing or unknown fields ({found}); use a file of this version of flexpara")
-    example = kind()
-    values: dict[str, Any] = {}
-    for name in names:
-        default, value = getattr(example, name), facts[name]
-        if is_dataclass(default):
-            values[name] = _from_json(type(default), value, f"{where}.{name}")
-            continue
-        expected = (int, float) if isinstance(default, float) else (type(default),)
-        if not isinstance(value, expected) or isinstance(value, bool) is not isinstance(default, bool):
-            raise InputError(f"{where}.{name} is {str(value)[:80]!r}, expected {type(default).__name__}; correct it")
-        values[name] = type(default)(value)
-    return kind(**values)

@@ -106,7 +106,7 @@ def finish_global(
             f"learned uv must be ({len(surface.vertices)}, 2) and finite, got {uv.shape} with "
             f"{int((~np.isfinite(uv)).sum())} values that are not; train again, with a smaller rate where it diverged"
         )
-    graph = dual_graph(surface, edge_table(surface.faces), config.finish.labels.crease_discount)
+    graph = dual_graph(surface, edge_table(surface.faces), config.finish.labels.seams)
     component = connected_pieces(np.zeros(len(surface.faces), dtype=np.int64), graph)
     stage("flatten")
     done = [

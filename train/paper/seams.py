@@ -11,14 +11,22 @@ thin and straight however wide and ragged the band.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from ...runtime.errors import ShapeError
-from ...runtime.geometry.cutgraph import closing_paths, edge_costs, path_mask, prune, shortest_paths, trace_back
+from ...runtime.geometry.cutgraph import (
+    SeamPrices,
+    closing_paths,
+    edge_costs,
+    path_mask,
+    prune,
+    shortest_paths,
+    trace_back,
+)
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.geometry.triangles import signed_areas
 from ..finish.disks import disk_cuts
@@ -38,8 +46,8 @@ class SeamConfig:
     """Tear from which an edge lies in the band; paths there cost half, and less the steeper the band."""
     cheapest: float = 0.01
     """Cost per length in the steepest band."""
-    crease_discount: float = 0.8
-    """How much cheaper a seam is along a sharp crease, in [0, 1)."""
+    prices: SeamPrices = field(default_factory=SeamPrices)
+    """What a seam costs outside the band."""
     shortest: float = 0.15
     """Branches that end inside the surface are kept from this length on: they relieve distortion."""
     within: float = 0.6
@@ -142,7 +150,7 @@ def seam_edges(piece: Surface, uv: NDArray[np.float64], config: SeamConfig = Sea
     """
     table = edge_table(piece.faces)
     torn = tears(piece, uv, config, table)
-    plain = edge_costs(piece, table, config.crease_discount)
+    plain = edge_costs(piece, table, config.prices)
     cost = plain * np.maximum(1.0 / (1.0 + (torn.edge / config.torn) ** 2), config.cheapest)
     border = np.unique(table.edges[table.edge_count == 1])
     root = border if len(border) else np.array([far_end(piece, table, torn)])
@@ -163,7 +171,7 @@ def far_cut(piece: Surface, table: EdgeTable, cost: NDArray[np.float64], config:
     paths = shortest_paths(len(piece.vertices), table.edges, cost, np.array([first]))
     path = trace_back(paths.parent, int(paths.distance.argmax()))
     # one edge alone opens nothing
-    return path_mask(table, [path]) if len(path) > 2 else disk_cuts(piece, table, config.crease_discount)
+    return path_mask(table, [path]) if len(path) > 2 else disk_cuts(piece, table, config.prices)
 
 
 def far_end(piece: Surface, table: EdgeTable, torn: Tears) -> int:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:
     """The pieces and slits of the coarse twin, on the surface itself."""
     keys, label = np.unique(found.label(), return_inverse=True)
-    graph = dual_graph(surface, edge_table(surface.faces), config.labels.crease_discount)
+    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     areas = surface.face_areas()
     smooth = smoothed_in_band(votes(coarse, label.reshape(-1), surface, config.carry), areas, graph, config)
     limit = max(charts, len(keys))

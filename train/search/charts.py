@@ -234,7 +234,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
 
 def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
     """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
-    graph = dual_graph(surface, edge_table(surface.faces), config.labels.crease_discount)
+    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     searches = []
     rounds = config.few_rounds if starts.small else config.rounds
     if unfolded:

@@ -16,6 +16,7 @@ from ...runtime.geometry.cutgraph import seam_prices
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.geometry.topology import EdgeTable
     from ...runtime.mesh import Surface
     from ..config import LabelConfig
@@ -29,17 +30,17 @@ class DualGraph(NamedTuple):
     cost: NDArray[np.float64]
 
 
-def dual_graph(surface: Surface, table: EdgeTable, crease_discount: float) -> DualGraph:
-    """The dual graph of a surface; a seam along a sharp crease costs down to (1 − crease_discount) of its length.
+def dual_graph(surface: Surface, table: EdgeTable, prices: SeamPrices) -> DualGraph:
+    """The dual graph of a surface; a seam costs what `seam_prices` says.
 
-    See `seam_prices`.  Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join
+    Edges that are not manifold, or where two faces disagree in orientation (a Möbius strip's), join
     nothing: the surface is cut there anyway.
     """
     inside = np.flatnonzero(table.manifold)
     pairs = table.edge_faces[inside]
     ends = surface.vertices[table.edges[inside]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return DualGraph(pairs, length, length * seam_prices(surface, table, crease_discount)[inside])
+    return DualGraph(pairs, length, length * seam_prices(surface, table, prices)[inside])
 
 
 def label_energy(label: NDArray[np.int64], unary: NDArray[np.float64], graph: DualGraph) -> float:

@@ -52,7 +52,7 @@ class Search:
         self.area = float(self.areas.sum())
         self.unit = float(np.sqrt(self.area))
         self.centroids = surface.triangles.mean(axis=1)
-        self.curvature = Curvature.of(surface)
+        self.curvature = Curvature.of(surface, config.slit.contact.cotangents)
         self.table = edge_table(surface.faces)
         self.pieces: dict[int, Piece] = {}
         self.tried: dict[Pair, Piece | None] = {}

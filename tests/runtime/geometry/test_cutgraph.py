@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.geometry.cutgraph import (
-    FLAT_SURCHARGE,
+    SeamPrices,
     closing_edges,
     closing_paths,
     crease_sharpness,
@@ -19,6 +19,8 @@ from flexpara.runtime.geometry.cutgraph import (
 from flexpara.runtime.geometry.topology import edge_table, euler_characteristic
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+
+PLAIN = SeamPrices(crease_discount=0.0)
 
 
 def sample(name: str, resolution: int) -> Surface:
@@ -51,7 +53,7 @@ def test_the_shortest_way_over_a_grid_runs_along_its_diagonals() -> None:
 def test_the_way_leads_to_the_nearest_source() -> None:
     grid = flat_grid(6, 1)
     table = edge_table(grid.faces)
-    paths = shortest_paths(14, table.edges, edge_costs(grid, table, 0.0), np.array([0, 12]))
+    paths = shortest_paths(14, table.edges, edge_costs(grid, table, PLAIN), np.array([0, 12]))
     assert paths.distance[[0, 2, 4, 6, 8, 10, 12]].tolist() == [0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]
     assert trace_back(paths.parent, 10) == [10, 12]
     assert trace_back(paths.parent, 0) == [0]
@@ -77,19 +79,19 @@ def test_an_edge_costs_its_length_a_crease_a_fifth_of_it_and_a_flat_face_much_mo
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     crease = (np.abs(ends.mean(axis=1)) > 0.5 - 1e-9).sum(axis=1) == 2
     assert crease.sum() == 12 * 2
-    flat = FLAT_SURCHARGE * length
-    assert edge_costs(cube, table, 0.0) == pytest.approx(np.where(crease, length, flat))
-    assert edge_costs(cube, table, 0.8) == pytest.approx(np.where(crease, 0.2 * length, flat))
+    flat = PLAIN.flat_price * length
+    assert edge_costs(cube, table, PLAIN) == pytest.approx(np.where(crease, length, flat))
+    assert edge_costs(cube, table, SeamPrices()) == pytest.approx(np.where(crease, 0.2 * length, flat))
     ball = sample("sphere", 24)
     table = edge_table(ball.faces)
     ends = ball.vertices[table.edges]
-    assert edge_costs(ball, table, 0.0) == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+    assert edge_costs(ball, table, PLAIN) == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
 
 def test_the_border_of_a_flat_sheet_costs_its_length() -> None:
     grid = flat_grid(2, 2)
     table = edge_table(grid.faces)
-    assert edge_costs(grid, table, 0.8)[table.boundary] == pytest.approx(1.0)
+    assert edge_costs(grid, table, SeamPrices())[table.boundary] == pytest.approx(1.0)
 
 
 def test_pruning_keeps_loops_and_drops_what_leads_nowhere() -> None:
@@ -128,7 +130,7 @@ def test_there_are_two_closing_edges_a_handle(name: str) -> None:
         pytest.importorskip("manifold3d")
     surface = sample(name, 24)
     table = edge_table(surface.faces)
-    cost = edge_costs(surface, table, 0.0)
+    cost = edge_costs(surface, table, PLAIN)
     paths = shortest_paths(len(surface.vertices), table.edges, cost, np.array([0]))
     assert len(closing_edges(table, cost, paths)) == 2 - euler_characteristic(surface.faces)
 
@@ -136,7 +138,7 @@ def test_there_are_two_closing_edges_a_handle(name: str) -> None:
 def test_the_closing_path_of_a_tube_leads_from_border_to_border() -> None:
     surface = sample("tube", 24)
     table = edge_table(surface.faces)
-    cost = edge_costs(surface, table, 0.0)
+    cost = edge_costs(surface, table, PLAIN)
     border = np.unique(table.edges[table.boundary])
     (path,) = closing_paths(table, cost, shortest_paths(len(surface.vertices), table.edges, cost, border))
     assert np.isin(path, border).tolist() == [True, *[False] * (len(path) - 2), True]

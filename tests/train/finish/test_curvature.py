@@ -9,6 +9,7 @@ from flexpara.runtime.geometry.overlap import flipped_triangles
 from flexpara.runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.finish.config import CotangentConfig
 from flexpara.train.finish.curvature import (
     Curvature,
     border_first,
@@ -21,6 +22,7 @@ from flexpara.train.finish.curvature import (
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.finish.slits import border_of
 
+CONFIG = CotangentConfig()
 RIGHT = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
 
 
@@ -59,14 +61,14 @@ def test_a_right_triangle_has_its_cotangents() -> None:
 def test_a_face_without_area_has_finite_cotangents_and_a_curvature() -> None:
     flat = Surface(np.array([[0.0, 0, 0], [2, 0, 0], [1, 0, 0]]), np.array([[0, 1, 2]]))
     assert np.isfinite(corner_cotangents(flat.triangles)).all()
-    assert Curvature.of(flat).turn == pytest.approx([0.0, 0.0, np.pi])
+    assert Curvature.of(flat, CONFIG).turn == pytest.approx([0.0, 0.0, np.pi])
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "trefoil", "cube"])
 def test_the_curvature_of_a_closed_surface_adds_up_to_its_topology(name: str) -> None:
     """Gauss–Bonnet: Σ (2π − angles) = 2π χ."""
     surface = sample(name, 24)
-    defect = 2.0 * np.pi - Curvature.of(surface).turn
+    defect = 2.0 * np.pi - Curvature.of(surface, CONFIG).turn
     assert defect.sum() == pytest.approx(2.0 * np.pi * euler_characteristic(surface.faces), abs=1e-8)
 
 
@@ -74,7 +76,7 @@ def test_the_curvature_of_a_closed_surface_adds_up_to_its_topology(name: str) ->
 def test_the_bend_of_a_flattened_border_adds_up_to_a_full_turn(name: str) -> None:
     """Σ of the exterior angles, once the curvature inside has been moved to the border, is 2π."""
     surface = hemisphere(8) if name == "hemisphere" else sample(name, 16)
-    curvature, rim = Curvature.of(surface), rim_of(surface)
+    curvature, rim = Curvature.of(surface, CONFIG), rim_of(surface)
     bend = np.pi - curvature.turn[rim] + (curvature.laplacian @ curvature.factor(rim))[rim]
     assert bend.sum() == pytest.approx(2.0 * np.pi, abs=1e-6)
 
@@ -82,7 +84,7 @@ def test_the_bend_of_a_flattened_border_adds_up_to_a_full_turn(name: str) -> Non
 def test_the_laplacian_is_symmetric_has_no_constant_part_and_measures_a_plane_exactly() -> None:
     """The Dirichlet energy of x over a flat square of side 2 is half its area, times two: xᵀLx = 4."""
     sheet = flat_sheet(12)
-    laplacian = Curvature.of(sheet).laplacian
+    laplacian = Curvature.of(sheet, CONFIG).laplacian
     assert abs(laplacian - laplacian.T).max() < 1e-12
     assert np.abs(laplacian @ np.ones(len(sheet.vertices))).max() < 1e-12
     x = sheet.vertices[:, 0]
@@ -91,20 +93,20 @@ def test_the_laplacian_is_symmetric_has_no_constant_part_and_measures_a_plane_ex
 
 def test_a_flat_sheet_keeps_its_scale() -> None:
     sheet = flat_sheet(12)
-    assert Curvature.of(sheet).factor(rim_of(sheet)) == pytest.approx(0.0, abs=1e-9)
+    assert Curvature.of(sheet, CONFIG).factor(rim_of(sheet)) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_scale_of_a_hemisphere_that_keeps_its_equator_is_known_at_the_pole_and_between() -> None:
     """Stereographic projection from the other pole: scale 1 / (1 + sin latitude), so u = −ln 2 at the pole."""
     half = hemisphere(24)
-    u = Curvature.of(half).factor(rim_of(half))
+    u = Curvature.of(half, CONFIG).factor(rim_of(half))
     assert u[-1] == pytest.approx(-np.log(2.0), abs=0.01)
     assert u == pytest.approx(-np.log1p(half.vertices[:, 2]), abs=0.01)
 
 
 def test_a_closed_surface_and_one_that_is_all_border_keep_their_scale() -> None:
     sphere = sample("sphere", 12)
-    curvature = Curvature.of(sphere)
+    curvature = Curvature.of(sphere, CONFIG)
     assert not curvature.factor(np.zeros(len(sphere.vertices), dtype=bool)).any()
     assert not curvature.factor(np.ones(len(sphere.vertices), dtype=bool)).any()
 
@@ -112,7 +114,9 @@ def test_a_closed_surface_and_one_that_is_all_border_keep_their_scale() -> None:
 def test_size_does_not_change_the_scale_factor() -> None:
     half = hemisphere(8)
     small = Surface(1e-3 * half.vertices, half.faces)
-    assert Curvature.of(small).factor(rim_of(small)) == pytest.approx(Curvature.of(half).factor(rim_of(half)))
+    assert Curvature.of(small, CONFIG).factor(rim_of(small)) == pytest.approx(
+        Curvature.of(half, CONFIG).factor(rim_of(half))
+    )
 
 
 def test_the_energy_foretold_is_that_of_a_similarity_and_capped() -> None:
@@ -131,14 +135,14 @@ def test_the_energy_foretold_orders_caps_of_a_sphere_by_how_much_they_cover() ->
     for height in (0.8, 0.4, 0.0, -0.4):
         used, index = np.unique(sphere.faces[sphere.triangles.mean(axis=1)[:, 2] > height], return_inverse=True)
         cap = Surface(sphere.vertices[used], index.reshape(-1, 3).astype(np.int64))
-        energy.append(foretold_energy(cap, Curvature.of(cap).factor(rim_of(cap))))
+        energy.append(foretold_energy(cap, Curvature.of(cap, CONFIG).factor(rim_of(cap))))
     assert energy == sorted(energy)
     assert energy[0] < 0.01 * energy[-1]
 
 
 def test_a_flat_disk_laid_out_by_its_border_is_isometric() -> None:
     sheet = flat_sheet(12)
-    uv = border_first(sheet, boundary_loops(sheet.faces)[0])
+    uv = border_first(sheet, boundary_loops(sheet.faces)[0], CONFIG)
     sigma = np.linalg.svd(jacobians(sheet, uv), compute_uv=False)
     assert sigma == pytest.approx(1.0, abs=1e-6)
     assert not flipped_triangles(uv[sheet.faces]).any()
@@ -146,7 +150,7 @@ def test_a_flat_disk_laid_out_by_its_border_is_isometric() -> None:
 
 def test_a_hemisphere_laid_out_by_its_border_is_a_round_disk_of_its_equator() -> None:
     half = hemisphere(16)
-    uv = border_first(half, boundary_loops(half.faces)[0])
+    uv = border_first(half, boundary_loops(half.faces)[0], CONFIG)
     rim = rim_of(half)
     radius = np.linalg.norm(uv[rim] - uv[rim].mean(axis=0), axis=1)
     assert radius == pytest.approx(1.0, abs=0.01)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.topology import (
     boundary_loops,
     components,
@@ -57,7 +58,7 @@ def square_tube() -> Surface:
 def cut(surface: Surface, crease_discount: float = 0.0) -> tuple[Surface, float]:
     """The surface opened by its disk cuts, and their length."""
     table = edge_table(surface.faces)
-    mask = disk_cuts(surface, table, crease_discount)
+    mask = disk_cuts(surface, table, SeamPrices(crease_discount))
     ends = surface.vertices[table.edges[mask]]
     faces, old = cut_open(surface.faces, mask, table)
     assert np.array_equal(old[faces], surface.faces)  # the same triangles, only taken apart
@@ -78,13 +79,13 @@ def test_a_triangle_is_a_disk_and_a_tetrahedron_is_not() -> None:
 
 def test_one_triangle_needs_no_cut() -> None:
     surface = Surface(np.eye(3), TRIANGLE)
-    assert not disk_cuts(surface, edge_table(TRIANGLE), 0.8).any()
+    assert not disk_cuts(surface, edge_table(TRIANGLE), SeamPrices()).any()
 
 
 @pytest.mark.parametrize("name", ["cloth", "cone"])
 def test_a_disk_needs_no_cut(name: str) -> None:
     surface = sample(name, 16)
-    assert not disk_cuts(surface, edge_table(surface.faces), 0.8).any()
+    assert not disk_cuts(surface, edge_table(surface.faces), SeamPrices()).any()
 
 
 @pytest.mark.parametrize("discount", [0.0, 0.8])
@@ -103,7 +104,7 @@ def test_no_cut_through_handles_has_a_dead_end(first: int) -> None:
     order = np.roll(np.arange(len(bracket.vertices)), -first)
     surface = Surface(bracket.vertices[order], np.argsort(order)[bracket.faces])
     table = edge_table(surface.faces)
-    assert (np.bincount(table.edges[disk_cuts(surface, table, 0.8)].reshape(-1)) != 1).all()
+    assert (np.bincount(table.edges[disk_cuts(surface, table, SeamPrices())].reshape(-1)) != 1).all()
     assert_disk(cut(surface, 0.8)[0])
 
 
@@ -144,7 +145,7 @@ def test_a_sphere_is_slit_between_two_far_points() -> None:
 def test_the_discount_draws_the_cut_onto_a_crease() -> None:
     tube = square_tube()
     table = edge_table(tube.faces)
-    mask = disk_cuts(tube, table, 0.8)
+    mask = disk_cuts(tube, table, SeamPrices())
     ends = tube.vertices[table.edges[mask]]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     assert np.abs(ends[..., :2]) == pytest.approx(0.5)
@@ -157,7 +158,7 @@ def test_a_cut_goes_round_to_reach_a_crease_that_saves_more() -> None:
     ends = cube.vertices[table.edges]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     crease = (np.abs(ends.mean(axis=1)) > 0.5 - 1e-9).sum(axis=1) == 2
-    drawn = disk_cuts(cube, table, 0.8)
+    drawn = disk_cuts(cube, table, SeamPrices())
     assert length[drawn].sum() >= 1.6 - 1e-9  # straight across: 0.3 + 1 + 0.3
     assert length[drawn & crease].sum() >= 1.0 - 1e-9
 

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, components, euler_characteristic, is_manifold
 from flexpara.runtime.geometry.triangles import signed_areas
@@ -111,13 +112,13 @@ def test_the_border_of_one_side_of_a_cube_is_four_edges_and_of_the_whole_none() 
 
 def test_a_disk_opens_as_it_is() -> None:
     cone = sample("cone", 16)
-    (only,) = openings(cone, 0.8)
+    (only,) = openings(cone, SeamPrices())
     assert only is cone
 
 
 def test_a_ring_opens_as_it_is_or_cut_through() -> None:
     tube = sample("tube", 16)
-    kept, cut = openings(tube, 0.8)
+    kept, cut = openings(tube, SeamPrices())
     assert kept is tube
     assert euler_characteristic(cut.faces) == 1
     assert border_length(cut) == pytest.approx(border_length(tube) + 2.0 * 2.0)
@@ -127,7 +128,7 @@ def test_a_ring_opens_as_it_is_or_cut_through() -> None:
 def test_a_closed_surface_opens_in_one_way(name: str) -> None:
     if name == "gyroid":
         pytest.importorskip("manifold3d")
-    (cut,) = openings(sample(name, 24), 0.8)
+    (cut,) = openings(sample(name, 24), SeamPrices())
     assert euler_characteristic(cut.faces) == 1
     assert len(boundary_loops(cut.faces)) == 1
 
@@ -135,7 +136,7 @@ def test_a_closed_surface_opens_in_one_way(name: str) -> None:
 def test_a_handle_with_a_hole_is_cut() -> None:
     torus = sample("torus", 24)
     pierced = extract(torus, where(np.linalg.norm(torus.triangles.mean(axis=1) - [1.0, 0, 0], axis=1) > 0.2))
-    (cut,) = openings(pierced, 0.8)
+    (cut,) = openings(pierced, SeamPrices())
     assert euler_characteristic(cut.faces) == 1
 
 

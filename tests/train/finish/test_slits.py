@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import (
     EdgeTable,
@@ -109,7 +110,7 @@ def way_to_the_apex(cone: Surface) -> list[int]:
 def test_border_paths_lead_straight_up_a_cone() -> None:
     cone = sample("cone", 24)
     table = edge_table(cone.faces)
-    paths = border_paths(cone, table, border_of(table), replace(CONFIG, crease_discount=0.0))
+    paths = border_paths(cone, table, border_of(table), replace(CONFIG, seams=SeamPrices(crease_discount=0.0)))
     slant = np.hypot(0.5, 1.0)
     assert paths.distance == pytest.approx(slant * cone.vertices[:, 2], abs=1e-9)
 

@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.overlap import flipped_triangles
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
@@ -43,7 +44,7 @@ def unit(name: str, resolution: int) -> Surface:
 
 
 def graph_of(surface: Surface) -> DualGraph:
-    return dual_graph(surface, edge_table(surface.faces), 0.8)
+    return dual_graph(surface, edge_table(surface.faces), SeamPrices())
 
 
 def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
@@ -24,7 +25,7 @@ CENTROIDS = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
 
 
 def links_of(surface: Surface, ids: NDArray[np.int64] | None = None) -> Links:
-    graph = dual_graph(surface, edge_table(surface.faces), 0.0)
+    graph = dual_graph(surface, edge_table(surface.faces), SeamPrices(crease_discount=0.0))
     return Links(np.arange(len(surface.faces)) if ids is None else ids, graph, len(surface.faces))
 
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from flexpara.runtime.geometry.cutgraph import FLAT_SURCHARGE
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
@@ -32,7 +32,7 @@ def sample(name: str, resolution: int) -> Surface:
 
 
 def graph_of(surface: Surface, crease_discount: float = 0.0) -> DualGraph:
-    return dual_graph(surface, edge_table(surface.faces), crease_discount)
+    return dual_graph(surface, edge_table(surface.faces), SeamPrices(crease_discount))
 
 
 def hinge(angle: float) -> Surface:
@@ -59,7 +59,7 @@ def least_energy(choices: list[tuple[int, ...]], unary: np.ndarray, graph: DualG
     return min(label_energy(np.array(label), unary, graph) for label in product(*choices))
 
 
-@pytest.mark.parametrize(("angle", "cost"), [(0.0, 2.0 * FLAT_SURCHARGE), (1e-3, 2.0)])
+@pytest.mark.parametrize(("angle", "cost"), [(0.0, 2.0 * SeamPrices().flat_price), (1e-3, 2.0)])
 def test_two_triangles_share_one_edge_whose_seam_costs_its_length_or_more_within_a_flat_face(
     angle: float, cost: float
 ) -> None:

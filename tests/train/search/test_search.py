@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
@@ -30,7 +31,7 @@ def unit(name: str, resolution: int) -> Surface:
 
 def search_of(surface: Surface, label: np.ndarray | None = None, config: FinishConfig = CONFIG) -> Search:
     """A search that begins with one piece for each connected part of a label."""
-    search = Search(surface, dual_graph(surface, edge_table(surface.faces), 0.8), config)
+    search = Search(surface, dual_graph(surface, edge_table(surface.faces), SeamPrices()), config)
     if label is not None:
         piece = connected_pieces(label, search.graph)
         for number in range(int(piece.max()) + 1):

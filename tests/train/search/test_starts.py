@@ -22,7 +22,7 @@ def unit(name: str, resolution: int) -> Surface:
 
 
 def graph_of(surface: Surface) -> DualGraph:
-    return dual_graph(surface, edge_table(surface.faces), CONFIG.labels.crease_discount)
+    return dual_graph(surface, edge_table(surface.faces), CONFIG.labels.seams)
 
 
 def labelled(surface: Surface, count: int, seed: int = 0) -> np.ndarray:
