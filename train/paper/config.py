@@ -111,6 +111,12 @@ class PaperConfig:
     """
     decay: float = 1e-8
     """Weight decay (decided: likewise)."""
+    mean_kept: float = 0.9
+    """β₁ of AdamW: share of the mean gradient that a step keeps, in [0, 1) (decided: as published)."""
+    square_kept: float = 0.999
+    """β₂ of AdamW: the same for the mean square (decided: as published)."""
+    least_root: float = 1e-8
+    """ε of AdamW: added to the root of the mean square (decided: as published)."""
     neighbours: int = 8
     """J_u: neighbours in uv that repel a point (decided: likewise)."""
     cut_neighbours: int = 3
@@ -154,8 +160,10 @@ class PaperConfig:
             _within(name, getattr(self, name), 1, 1000)
         _within("nets.hidden", self.nets.hidden, *PAPER_RANGES["width"])
         _within("nets.embedding", self.nets.embedding, 1, 8192)
-        for name in ("rate", "final_rate", "decay", "epsilon", "cut_share", "score_spread"):
+        for name in ("rate", "final_rate", "decay", "least_root", "epsilon", "cut_share", "score_spread"):
             _finite(name, getattr(self, name))
+        for name in ("mean_kept", "square_kept"):
+            _share(name, getattr(self, name))
         for owner in ("nets", "global_weights", "chart_weights"):
             for name, value in asdict(getattr(self, owner)).items():
                 _finite(f"{owner}.{name}", value)
@@ -176,3 +184,8 @@ def _within(name: str, value: int, least: int, most: int) -> None:
 def _finite(name: str, value: float) -> None:
     if not (math.isfinite(value) and value >= 0.0):
         raise InputError(f"{name} is {value}, expected a finite number ≥ 0; choose another")
+
+
+def _share(name: str, value: float) -> None:
+    if not 0.0 <= value < 1.0:
+        raise InputError(f"{name} is {value}, expected 0 or more and less than 1; choose another")

@@ -17,9 +17,6 @@ from torch import Tensor, nn
 if TYPE_CHECKING:
     from .config import PaperConfig
 
-BETAS = (0.9, 0.999)
-EPSILON = 1e-8
-
 
 def cosine_rate(step: int, steps: int, first: float, last: float) -> float:
     """Learning rate of a step: from ``first`` at 0 along half a cosine towards ``last`` at ``steps``."""
@@ -53,14 +50,15 @@ class CosineAdamW:
         config = self._config
         rate = cosine_rate(self.taken, config.steps, config.rate, config.final_rate) * config.rate_factor
         self.taken += 1
-        first, second = (1.0 - beta**self.taken for beta in BETAS)
+        mean, square = config.mean_kept, config.square_kept
+        first, second = 1.0 - mean**self.taken, 1.0 - square**self.taken
         with torch.no_grad():
-            torch._foreach_lerp_(self._means, gradients, 1.0 - BETAS[0])
-            torch._foreach_mul_(self._squares, BETAS[1])
-            torch._foreach_addcmul_(self._squares, gradients, gradients, value=1.0 - BETAS[1])
+            torch._foreach_lerp_(self._means, gradients, 1.0 - mean)
+            torch._foreach_mul_(self._squares, square)
+            torch._foreach_addcmul_(self._squares, gradients, gradients, value=1.0 - square)
             roots = torch._foreach_sqrt(self._squares)
             torch._foreach_div_(roots, math.sqrt(second))
-            torch._foreach_add_(roots, EPSILON)
+            torch._foreach_add_(roots, config.least_root)
             torch._foreach_mul_(self._parameters, 1.0 - rate * config.decay)
             torch._foreach_addcdiv_(self._parameters, self._means, roots, value=-rate / first)
 
