@@ -47,7 +47,9 @@ class GrowthConfig:
     steps: int = 4
     """Linear programs a round."""
     trust: float = 1.0 / 100.0
-    """Farthest that a chart moves in the first step, share; less where there are more than 24 charts."""
+    """Farthest that a chart moves in the first step, share …"""
+    crowd: float = 24.0
+    """… less, by the root of their number over this one, where there are more charts."""
     calmer: float = 0.75
     """Factor on it from step to step."""
     smaller: float = 0.1

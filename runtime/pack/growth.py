@@ -91,7 +91,7 @@ class _Crowd:
 def _grown(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> tuple[_Crowd, int]:
     """The crowd after rounds of linear programs, each kept where charts really grew, and the programs left out."""
     k, skipped = len(crowd.centre), 0
-    trust = config.trust / max(1.0, math.sqrt(k / 24.0))
+    trust = config.trust / max(1.0, math.sqrt(k / config.crowd))
     for _ in range(config.rounds if k <= config.few else 0):
         pairs = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.reach)
         moved = crowd

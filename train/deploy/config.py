@@ -60,6 +60,8 @@ class GrowConfig:
     """What an affine map on a surface counts for, in samples, where two charts meet."""
     gate_ridge: float = 1e-4
     """Ridge of the affine maps that gates are compared by, as a share of the node's squared extent."""
+    apart: float = 30.0
+    """How far apart the outputs of charts are moved while gates are sought, as a multiple of the outputs' extent."""
     torn: float = 8.0
     """An expert that misses its samples by so many tolerances (rms) holds two sides of a slit, and takes one."""
     steepest: float = 4.0

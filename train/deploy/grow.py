@@ -86,7 +86,7 @@ def grow_on(grid: Grid, lesson: Lesson, config: GrowConfig, tolerance: float, rn
     order = np.argsort(cells, kind="stable")
     slot, first = np.unique(cells[order], return_index=True)
     nodes, decided, depth = Nodes(order, first, slot), Decided(np.zeros(grid.count, dtype=np.int64)), 0
-    apart = _apart(lesson)
+    apart = _apart(lesson, config.apart)
     while len(nodes.first):
         done = _is_done(apart, nodes, config, tolerance, decided) | (depth >= config.deepest)
         nodes = _halve(apart, nodes, done, config, decided, rng)
@@ -116,11 +116,11 @@ def _filled_grid(x: NDArray[np.float64], cells: int, config: GrowConfig) -> Grid
         cells = max(cells * 2 // 3, config.coarsest)
 
 
-def _apart(lesson: Lesson) -> Lesson:
+def _apart(lesson: Lesson, multiple: float) -> Lesson:
     """The outputs of each label moved far away from those of all others, so that one error speaks for both."""
     extent = max(float(np.ptp(lesson.y, axis=0).max()), 1e-9)
     labels = int(lesson.label.max()) + 1
-    away = np.random.default_rng(0).uniform(-1.0, 1.0, size=(labels, lesson.y.shape[1])) * 30.0 * extent
+    away = np.random.default_rng(0).uniform(-1.0, 1.0, size=(labels, lesson.y.shape[1])) * multiple * extent
     return lesson._replace(y=lesson.y + away[lesson.label])
 
 

@@ -61,6 +61,8 @@ class SlitConfig:
     """Mean excess energy (symmetric Dirichlet − 1, share of the surface's area) that a slit of length 1 has to save."""
     radius: float = 0.03
     """Neighbourhood over which stress is averaged."""
+    rings: int = 60
+    """Rings of vertices in that neighbourhood at most."""
     shortest: float = 0.1
     """Slits shorter than this are judged as if they had this length."""
     near: float = 0.03

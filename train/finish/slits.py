@@ -41,8 +41,8 @@ class Flat(NamedTuple):
         return self._replace(uv=state.uv, pins=state.pins)
 
 
-def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
-    """(v,) excess energy density around each vertex, smoothed over about ``radius`` (source units).
+def stress(flat: Flat, table: EdgeTable, radius: float, rings: int) -> NDArray[np.float64]:
+    """(v,) excess energy density around each vertex, smoothed over about ``radius`` (source units), at most ``rings``.
 
     Only squeezed faces count: a slit lets a cone open; at a saddle, which is stretched, its two sides would overlap.
     """
@@ -60,7 +60,7 @@ def stress(flat: Flat, table: EdgeTable, radius: float) -> NDArray[np.float64]:
     )
     links = (links + sparse.eye_array(count)).tocsr()
     links = sparse.diags_array(1.0 / links.sum(axis=0)) @ links  # columns pass on all they have
-    for _ in range(int(np.clip((radius / spacing) ** 2, 1, 60))):
+    for _ in range(int(np.clip((radius / spacing) ** 2, 1, rings))):
         mass, load = links.T @ mass, links.T @ load
     return load / np.maximum(mass, 1e-300)
 
@@ -94,12 +94,16 @@ def most_stressed(
     table: EdgeTable,
     distance: NDArray[np.float64],
     spared: list[NDArray[np.float64]],
-    reach: float,
-    near: float,
+    unit: float,
+    config: SlitConfig,
 ) -> int | None:
-    """The vertex a slit should lead to: no closer to the border than ``near``, and 2 · reach from spared points."""
-    pressure = stress(flat, table, reach)
-    pressure[~(distance >= near)] = 0.0
+    """The vertex a slit should lead to: no closer to the border than ``config.near``, and 2 radii from spared points.
+
+    ``unit``: √(surface area).
+    """
+    reach = config.radius * unit
+    pressure = stress(flat, table, reach, config.rings)
+    pressure[~(distance >= config.near * unit)] = 0.0
     for point in spared:
         pressure[np.linalg.norm(flat.surface.vertices - point, axis=1) < 2.0 * reach] = 0.0
     target = int(pressure.argmax())
@@ -176,7 +180,7 @@ def slit_where_it_pays(flat: Flat, total_area: float, config: SlitConfig) -> tup
         table = edge_table(flat.surface.faces)
         border = np.unique(table.edges[table.edge_count == 1])
         distance = border_paths(flat.surface, table, border, config).distance
-        target = most_stressed(flat, table, distance, spared, config.radius * unit, config.near * unit)
+        target = most_stressed(flat, table, distance, spared, unit, config)
         if target is None:
             break
         point = flat.surface.vertices[target]

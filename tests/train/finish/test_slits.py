@@ -170,26 +170,26 @@ def test_a_second_way_starts_elsewhere() -> None:
 def test_a_flat_sheet_has_no_stress() -> None:
     sheet = flat_sheet(12)
     flat = Flat(sheet, sheet.vertices[:, :2].copy(), {})
-    assert stress(flat, edge_table(sheet.faces), 0.2) == pytest.approx(0.0, abs=1e-9)
+    assert stress(flat, edge_table(sheet.faces), 0.2, CONFIG.rings) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_stress_is_greatest_at_the_apex_of_a_cone() -> None:
     flat = flattened(sample("cone", 24))
-    pressure = stress(flat, edge_table(flat.surface.faces), 0.1)
+    pressure = stress(flat, edge_table(flat.surface.faces), 0.1, CONFIG.rings)
     assert np.linalg.norm(flat.surface.vertices[pressure.argmax()] - APEX) < 0.2
 
 
 def test_stretched_faces_alone_are_no_stress_for_a_slit() -> None:
     sheet = flat_sheet(12)
-    table = edge_table(sheet.faces)
-    assert stress(Flat(sheet, 2.0 * sheet.vertices[:, :2], {}), table, 0.2) == pytest.approx(0.0)
-    assert stress(Flat(sheet, 0.5 * sheet.vertices[:, :2], {}), table, 0.2) == pytest.approx(17.0 / 8.0 - 1.0)
+    for factor, expected in ((2.0, 0.0), (0.5, 17.0 / 8.0 - 1.0)):
+        flat = Flat(sheet, factor * sheet.vertices[:, :2], {})
+        assert stress(flat, edge_table(sheet.faces), 0.2, CONFIG.rings) == pytest.approx(expected)
 
 
 def target_of(flat: Flat, spared: list[np.ndarray], reach: float = 0.1, near: float = 0.1) -> int | None:
     table = edge_table(flat.surface.faces)
     distance = border_paths(flat.surface, table, border_of(table), CONFIG).distance
-    return most_stressed(flat, table, distance, spared, reach, near)
+    return most_stressed(flat, table, distance, spared, 1.0, replace(CONFIG, radius=reach, near=near))
 
 
 def test_no_slit_is_proposed_where_nothing_is_squeezed() -> None:
