@@ -19,7 +19,7 @@ from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
 from .raster.plan import Plan, open_rasterizer
-from .seams import agrees_across_seams, find_seams, sample_seams, seam_error
+from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_error
 from .settings import BakeSettings
 from .texture import Texture
 from .windows import background_of, blank_gbuffer, computed, map_windows, put_together

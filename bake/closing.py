@@ -23,7 +23,7 @@ from scipy import sparse
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .seams import SeamSamples
+    from .seamcheck import SeamSamples
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from . import seams
+from . import seamcheck
 from .closing import ClosingConfig
 from .highpoly import cage, highpoly
 from .maps import curvature, occlusion, resample
@@ -24,9 +24,9 @@ class BakeConfig:
     """
 
     closing: ClosingConfig = field(default_factory=ClosingConfig)
-    seam_samples_per_texel: float = seams.PER_TEXEL
-    seam_smooth: float = seams.SMOOTH
-    seam_weld: float = seams.WELD
+    seam_samples_per_texel: float = seamcheck.PER_TEXEL
+    seam_smooth: float = seamcheck.SMOOTH
+    seam_weld: float = seamcheck.WELD
     border_reach: float = gbuffer.REACH
     gutter_exact: int = gutter.LEAST_NEAR
     background_cells: int = background.MOST_CELLS

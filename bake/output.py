@@ -197,7 +197,7 @@ def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:
     if not baked.textures:
         return {}
     from .config import BakeConfig
-    from .seams import seam_report
+    from .seamcheck import seam_report
 
     constant = {name: constant_value(texture) for name, texture in baked.textures.items()}
     return {
@@ -235,7 +235,7 @@ def texture_notes(facts: Mapping[str, Any]) -> list[str]:
 def bleeding(atlas: Atlas, size: int, padding: int | None) -> int:
     """The highest mip level of such textures at which no chart takes in another's texels."""
     from .baker import chart_labels
-    from .seams import clean_mip
+    from .seamcheck import clean_mip
 
     return clean_mip(chart_labels(atlas, size, padding), atlas)
 

@@ -17,7 +17,7 @@ from flexpara.bake.lettering import text_cover, with_text
 from flexpara.bake.pictures.canvas import Camera, Lines, draw, three_quarter_axes
 from flexpara.bake.pictures.preview import INK, PAPER, checker_cells, layout, shading_normals, solid
 from flexpara.bake.raster.context import open_context
-from flexpara.bake.seams import seam_edges
+from flexpara.bake.seamcheck import seam_edges
 from flexpara.bake.texture import Texture
 from flexpara.runtime.errors import InputError
 

@@ -21,9 +21,9 @@ from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.paper.batches import PaperInput
 from flexpara.train.paper.config import PaperConfig, PaperNets
+from flexpara.train.paper.learnedseams import cut_points
 from flexpara.train.paper.losses import angle_gap, corner_angles
 from flexpara.train.paper.pipeline import vertex_normals
-from flexpara.train.paper.seams import cut_points
 from flexpara.train.paper.training import train_paper
 
 from .paper_step import cpu_name

@@ -23,7 +23,7 @@ from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.search.recut import recut
 from .metadata import Provenance
-from .networks import export_networks
+from .onnxfile import export_networks
 
 if TYPE_CHECKING:
     from torch import nn
@@ -123,7 +123,7 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
     from ..runtime.sessions.wrapagreement import inverse_agreement
     from ..runtime.sessions.wrapsession import WrapSession
     from ..train.deploy.fit_wrap import fit_wrap
-    from .wrap import export_wrap
+    from .wrapfile import export_wrap
 
     ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)
     settings = found.report["settings"]

@@ -1,4 +1,4 @@
-"""A small ONNX graph, collected node by node: the only module that touches the onnx package.
+"""A small ONNX graph, collected node by node, checked, and turned into bytes.
 
 Names depend on the order of the calls alone; no time, path or stack trace is stored: equal calls give equal bytes.
 """

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 
 from ..runtime.mesh import Atlas, Charts
-from .graph import frozen_copy
-from .onnx import export_onnx
+from .torchfile import export_onnx
+from .torchmodel import frozen_copy
 
 if TYPE_CHECKING:
     from torch import nn

@@ -1,4 +1,4 @@
-"""Evaluate, pack and store atlases: numpy, scipy, trimesh, xatlas and onnxruntime only, never torch or OpenGL.
+"""Evaluate, pack and store atlases: numpy, scipy, trimesh and onnxruntime only, never torch or OpenGL.
 
 Lazy: `flexpara.runtime.UnwrapSession` loads onnxruntime when it is first named, and nothing else does.
 """

@@ -19,7 +19,7 @@ from ..files.images import write_png
 from ..heat import distortion_scale, face_areas, heat_colors, signed_distortion
 from ..lettering import with_text
 from ..raster.context import open_context
-from ..seams import chart_outlines, seam_edges
+from ..seamcheck import chart_outlines, seam_edges
 from ..texture import Texture
 from .canvas import Camera, Lines, Shape, draw, three_quarter_axes
 

@@ -3,21 +3,21 @@
 k charts · s outline segments · p pairs of segments that face each other.  All charts keep one common scale; distances
 are those of the outlines themselves.  Each step is a linear program in the charts' shifts and the growth of the common
 scale: to first order, the distance of two outlines changes by the motion along the line of their closest points
-(compaction of nested polygons, Li and Milenkovic 1995).
+(compaction of nested polygons, Li and Milenkovic 1995).  The padding is restored exactly after each round (`padding`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import coo_array, vstack
 
-from ..errors import FinishError
-from ..geometry.gaps import closest_points, facing_segments, near_segments, segment_distance
+from ..geometry.gaps import closest_points, facing_segments
+from .padding import Crowd, padded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,27 +68,13 @@ def grown(
     border, apart = padding / size + slack, 2.0 * (padding / size + slack)
     fit = (1.0 - 2.0 * border) / float(np.ptp(box.reshape(-1, 2), axis=0).max())
     fitted = border + fit * (centre - box.reshape(-1, 2).min(axis=0))
-    crowd = _Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
-    crowd, skipped = _grown(_settled(crowd, border, apart, config), border, apart, config)
+    crowd = Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
+    crowd, skipped = jammed(padded(crowd, border, apart, config), border, apart, config)
     linear, shift = placement[:, :, :2] * crowd.factor, (placement[:, :, 2] - centre) * crowd.factor + crowd.centre
     return np.concatenate([linear, shift[:, :, None]], axis=2), skipped
 
 
-@dataclass(frozen=True, eq=False)
-class _Crowd:
-    """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2)."""
-
-    local: NDArray[np.float64]
-    chart: NDArray[np.int64]
-    half: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    factor: float
-
-    def segments(self) -> NDArray[np.float64]:
-        return self.centre[self.chart][:, None] + self.factor * self.local
-
-
-def _grown(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> tuple[_Crowd, int]:
+def jammed(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> tuple[Crowd, int]:
     """The crowd after rounds of linear programs, each kept where charts really grew, and the programs left out."""
     k, skipped = len(crowd.centre), 0
     trust = config.trust / max(1.0, math.sqrt(k / config.crowd))
@@ -98,13 +84,13 @@ def _grown(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> 
         for step in range(config.steps):
             found = _step(moved, pairs, border, apart, trust * config.calmer**step)
             moved, skipped = found or moved, skipped + (found is None)
-        moved = _settled(moved, border, apart, config)
+        moved = padded(moved, border, apart, config)
         trust *= config.calmer**config.steps if moved.factor > crowd.factor else config.smaller
         crowd = max(crowd, moved, key=lambda one: one.factor)
     return crowd, skipped
 
 
-def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, trust: float) -> _Crowd | None:
+def _step(crowd: Crowd, pairs: NDArray[np.int64], border: float, apart: float, trust: float) -> Crowd | None:
     """One linear program: the largest growth of the factor, shifts and growth of a box within trust (uv units).
 
     None where it has no solution.  Two outlines come closer by 4·√2·trust at most, so pairs with more room than that
@@ -126,7 +112,7 @@ def _step(crowd: _Crowd, pairs: NDArray[np.int64], border: float, apart: float, 
     return replace(crowd, centre=crowd.centre + found.x[:-1].reshape(k, 2), factor=crowd.factor + float(found.x[-1]))
 
 
-def _pair_rows(crowd: _Crowd, pairs: NDArray[np.int64], apart: float) -> tuple[csr_array, NDArray[np.float64]]:
+def _pair_rows(crowd: Crowd, pairs: NDArray[np.int64], apart: float) -> tuple[csr_array, NDArray[np.float64]]:
     """Per pair of segments (p, 2): how much its distance shrinks with (x and y shifts, growth), and how much it may."""
     segments = crowd.segments()
     one, two = closest_points(segments[pairs[:, 0]], segments[pairs[:, 1]])
@@ -141,7 +127,7 @@ def _pair_rows(crowd: _Crowd, pairs: NDArray[np.int64], apart: float) -> tuple[c
     return coo_array(entries, shape=(len(pairs), last + 1)).tocsr(), distance - apart
 
 
-def _wall_rows(crowd: _Crowd, border: float) -> tuple[csr_array, NDArray[np.float64]]:
+def _wall_rows(crowd: Crowd, border: float) -> tuple[csr_array, NDArray[np.float64]]:
     """The same for the four sides of the square: 4·k rows."""
     half, centre = crowd.half.reshape(-1), crowd.centre.reshape(-1)
     number, last = np.arange(len(half)), np.full(len(half), len(half))
@@ -150,36 +136,3 @@ def _wall_rows(crowd: _Crowd, border: float) -> tuple[csr_array, NDArray[np.floa
     columns = np.concatenate([number, number, last, last])
     room = np.concatenate([1.0 - border - centre - crowd.factor * half, centre - border - crowd.factor * half])
     return coo_array((values, (rows, columns))).tocsr(), room
-
-
-def _settled(crowd: _Crowd, border: float, apart: float, config: GrowthConfig) -> _Crowd:
-    """The crowd with the largest factor that keeps all distances exactly, charts where they are."""
-    room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
-    walls = float((room / np.maximum(crowd.half, 1e-300)).min())
-    spacing = max(config.sample / 2.0, apart / 2.0)
-    pairs = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart + spacing)
-    for _ in range(config.repairs):
-        crowd = replace(crowd, factor=_largest_factor(crowd, pairs, apart, walls))
-        closest = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart)
-        if _free(crowd, closest, apart):
-            return crowd
-        pairs = np.concatenate([pairs, closest])
-    raise FinishError(
-        f"charts stay closer than {apart:.3g} of the atlas side after {config.repairs} repairs; please report"
-    )
-
-
-def _largest_factor(crowd: _Crowd, pairs: NDArray[np.int64], apart: float, walls: float) -> float:
-    """Largest factor up to walls, and 1.25 times the crowd's own, at which pairs (p, 2) of segments stay apart."""
-    low, high = 0.0, min(walls, 1.25 * crowd.factor)
-    if _free(replace(crowd, factor=high), pairs, apart):
-        return high
-    for _ in range(40):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if _free(replace(crowd, factor=middle), pairs, apart) else (low, middle)
-    return low
-
-
-def _free(crowd: _Crowd, pairs: NDArray[np.int64], apart: float) -> bool:
-    segments = crowd.segments()
-    return not bool((segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]) < apart).any())

@@ -4,8 +4,9 @@ k charts · S texels per side · P padding in texels.  Chart coordinates are sou
 smallest bounding rectangle, then by quarter turns, and moved; never mirrored, never stretched.  Outlines of two charts
 stay 2·P apart, and P from the border of the atlas.
 
-Charts are dropped on a skyline (`skyline`, `search`), grow where they lie until they jam (`growth`), and go to a
-lattice on which the exact tests are made (`lattice`): what was proven is what is written.
+Charts are dropped on a skyline (`skyline`, `placement`), grow where they lie until they jam (`growth`), keep the
+padding exactly (`padding`), and go to a lattice on which the exact tests are made (`lattice`): what was proven is what
+is written.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from .config import PackConfig
 from .growth import apply_placement, grown
 from .lattice import STEPS, Snapped, snap
 from .outlines import chart_outlines, outline_edges, rotation, upright_angle
-from .seams import atlas_normals, split_vertices
-from .search import search
+from .placement import find_layout
+from .seamvertices import atlas_normals, split_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -112,7 +113,7 @@ def _placed(
     upright = [outline @ rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
     area = float(np.abs(signed_areas(charts.corner_uv)).sum())
     # a hair more than the padding: charts that touch could not be parted by letting them shrink
-    layout = search(upright, area, padding / size + 4.0 / STEPS, config.place, np.random.default_rng(seed))
+    layout = find_layout(upright, area, padding / size + 4.0 / STEPS, config.place, np.random.default_rng(seed))
     linear = np.stack([layout.scale * rotation(angle) for angle in angles + layout.angle])
     extent = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
     longest = int(extent.argmax())

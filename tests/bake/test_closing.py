@@ -14,7 +14,7 @@ from flexpara.bake.bakemap import BakeMap
 from flexpara.bake.baker import bake
 from flexpara.bake.closing import ClosingConfig, bounded_least_squares, closed_seams, neighbour_range
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.bake.seams import SeamSamples, find_seams, sample_seams
+from flexpara.bake.seamcheck import SeamSamples, find_seams, sample_seams
 from flexpara.runtime.mesh import Asset, Atlas
 
 Pair = tuple[Atlas, Asset]

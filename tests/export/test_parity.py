@@ -12,9 +12,9 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from flexpara.export.graph import UnwrapGraph, truth_of
-from flexpara.export.onnx import ExportSpec, build_model
 from flexpara.export.parity import ParityReport, ParitySpec, probe_points, prove_parity
+from flexpara.export.torchfile import ExportSpec, build_model
+from flexpara.export.torchmodel import UnwrapGraph, truth_of
 from flexpara.runtime.errors import ParityError
 
 MapMaker = Callable[..., Any]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from flexpara.export.networks import export_networks
-from flexpara.export.wrap import export_wrap
+from flexpara.export.onnxfile import export_networks
+from flexpara.export.wrapfile import export_wrap
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Frame, Surface
 from flexpara.runtime.pack.packing import pack

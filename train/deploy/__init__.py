@@ -1,1 +1,1 @@
-"""The networks that are exported: charts divided into patches, networks fitted to them, and their inverse."""
+"""The networks that are exported, and their inverse: gates and affine experts, fitted to finished charts in closed form."""

@@ -1,1 +1,1 @@
-"""From face labels to valid charts: cut to disks, flattened, slit, split and merged, checked exactly."""
+"""One valid chart of a set of faces: cut to a disk, flattened (SLIM, ARAP), slit, held apart, checked exactly."""

@@ -13,11 +13,11 @@ import numpy as np
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic, split_non_manifold_vertices
 from ...runtime.mesh import Surface
+from .arap import unfolded
 from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_faces, rim_overlaps, separate
 from .curvature import border_first
 from .disks import cut_open, disk_cuts
 from .flatten import circle_map, fill_holes, slim, sorted_loops
-from .rigid import unfolded
 from .slits import Flat, Slit, foreseen_slits, slit_along, slit_where_it_pays
 
 if TYPE_CHECKING:

@@ -35,7 +35,7 @@ from ..search.proxy import simplified
 from ..search.search import Search
 from ..workers import parallel_map
 from .conformal import ConformalConfig, conformal_steps, is_valid
-from .seams import SeamConfig, seam_edges, tears
+from .learnedseams import SeamConfig, seam_edges, tears
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -24,7 +24,7 @@ from ..sampling import sample_surface
 from ..search.charts import chart_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
-from .seams import SeamConfig, cut_points, tears
+from .learnedseams import SeamConfig, cut_points, tears
 from .training import train_paper
 
 if TYPE_CHECKING:

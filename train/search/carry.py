@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
+from ..finish.arap import RigidSteps, nearest_rotations
 from ..finish.flatten import jacobians
 from ..finish.pieces import Piece
-from ..finish.rigid import RigidSteps, nearest_rotations
 from .labels import border_lengths, connected_pieces, dual_graph, smooth_labels
 from .search import Search
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from flexpara.export.onnx import export_onnx
+from flexpara.export.torchfile import export_onnx
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.session import UnwrapSession
 from flexpara.train.paper.config import PaperNets

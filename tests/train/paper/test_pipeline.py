@@ -16,6 +16,7 @@ from flexpara.train.config import FitConfig, TrainConfig
 from flexpara.train.deploy.config import SampleConfig
 from flexpara.train.paper.config import PaperConfig, PaperNets
 from flexpara.train.paper.finishing import GlobalFinishConfig
+from flexpara.train.paper.learnedseams import SeamConfig
 from flexpara.train.paper.pipeline import (
     as_numpy,
     distortions,
@@ -26,7 +27,6 @@ from flexpara.train.paper.pipeline import (
     train_paper_surface,
     vertex_normals,
 )
-from flexpara.train.paper.seams import SeamConfig
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,7 +1,7 @@
 """The deployed map in torch: what an exported file has to compute, said once and plainly.
 
 n points · p patches · k charts.  points: source units.  xyz: unit ball.  uv: [0, 1]², v up.
-This is the truth that the parity proof compares with; the exported graph (onnx.py) is built another way.
+This is the truth that the parity proof compares with; the exported graph (torchfile.py) is built another way.
 """
 
 from __future__ import annotations

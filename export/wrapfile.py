@@ -18,8 +18,8 @@ from ..runtime.sessions.wrapsession import wrap_json
 from ..train.deploy.fit_wrap import HEIGHT, on_layers
 from .builder import Ends, GraphBuilder
 from .frames import fold_frame
-from .gatedgraph import write_gated
 from .metadata import Provenance, bundle_metadata
+from .onnxgraph import write_gated
 from .parity import largest_difference, load_model, run_model
 from .proven import FileKind, check_folder, write_proven
 

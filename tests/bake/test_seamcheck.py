@@ -11,7 +11,7 @@ import pytest
 
 from flexpara.bake.baker import bake, chart_labels
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.bake.seams import (
+from flexpara.bake.seamcheck import (
     agrees_across_seams,
     chart_outlines,
     clean_mip,

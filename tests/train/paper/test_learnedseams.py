@@ -12,7 +12,7 @@ from flexpara.runtime.geometry.topology import boundary_loops, components, edge_
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.finish.disks import cut_open
-from flexpara.train.paper.seams import SeamConfig, cut_points, seam_edges, tears
+from flexpara.train.paper.learnedseams import SeamConfig, cut_points, seam_edges, tears
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

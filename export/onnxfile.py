@@ -14,8 +14,8 @@ import numpy as np
 from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
 from .frames import fold_frame, unit_ball
-from .gatedgraph import write_gated
 from .metadata import Provenance, bundle_metadata
+from .onnxgraph import write_gated
 from .parity import ParityReport, ParitySpec, Truth, probe_points, prove_parity
 from .proven import POINT_MAP, FileKind, check_folder, write_proven
 

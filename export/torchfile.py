@@ -19,11 +19,11 @@ import torch
 from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
 from .frames import unit_ball
-from .graph import UnwrapGraph, chart_membership, frozen_copy, truth_of
 from .lowering import Lowering, Value, cut_to_patch, is_per_patch, trace
 from .metadata import Provenance, bundle_metadata
 from .parity import ParityReport, ParitySpec, probe_points, prove_parity
 from .proven import POINT_MAP, FileKind, check_folder, write_proven
+from .torchmodel import UnwrapGraph, chart_membership, frozen_copy, truth_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,7 +61,7 @@ def export_onnx(
     Same model, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
 
     Args:
-        model: see graph.PatchNetworks; p = len(charts.patch_chart).  Neither moved nor changed.
+        model: see torchmodel.PatchNetworks; p = len(charts.patch_chart).  Neither moved nor changed.
         frame: source units → unit ball.
         atlas: of pack(); its placement must be set, its positions serve as probes.
         charts: patch_chart and face_patch are used.
@@ -95,7 +95,7 @@ def build_model(model: nn.Module, metadata: BundleMetadata, spec: ExportSpec) ->
 
 
 def _check_shapes(model: nn.Module, patches: int) -> None:
-    """The model keeps to graph.PatchNetworks, for as many patches as the charts have."""
+    """The model keeps to torchmodel.PatchNetworks, for as many patches as the charts have."""
     logits, uv = model(torch.zeros((3, 3)))
     if logits.shape != (3, patches) or uv.shape != (3, patches, 2):
         found = f"logits {tuple(logits.shape)} and uv {tuple(uv.shape)} for 3 points"

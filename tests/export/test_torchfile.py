@@ -15,10 +15,10 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from flexpara.export.graph import UnwrapGraph
 from flexpara.export.metadata import Provenance
-from flexpara.export.onnx import ExportSpec, export_onnx
 from flexpara.export.parity import ParitySpec
+from flexpara.export.torchfile import ExportSpec, export_onnx
+from flexpara.export.torchmodel import UnwrapGraph
 from flexpara.runtime.errors import FlexparaError, InputError, MissingFileError, ParityError, ShapeError
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
 

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 
 from flexpara.export.metadata import Provenance
 from flexpara.export.proven import FileKind
-from flexpara.export.wrap import Inverse, WrapParitySpec, WrapSpec, build_inverse, export_wrap, probe_uv, prove_inverse
+from flexpara.export.wrapfile import (
+    Inverse,
+    WrapParitySpec,
+    WrapSpec,
+    build_inverse,
+    export_wrap,
+    probe_uv,
+    prove_inverse,
+)
 from flexpara.runtime.errors import MissingFileError, ParityError, ShapeError
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
 from flexpara.runtime.sessions.wrapsession import WrapSession

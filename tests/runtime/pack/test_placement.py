@@ -10,7 +10,7 @@ from flexpara.runtime.errors import InputError
 from flexpara.runtime.geometry.gaps import smallest_chart_gap
 from flexpara.runtime.pack.config import PlaceConfig
 from flexpara.runtime.pack.outlines import rotation
-from flexpara.runtime.pack.search import Layout, search
+from flexpara.runtime.pack.placement import Layout, find_layout
 
 CONFIG = PlaceConfig()
 
@@ -23,7 +23,7 @@ def box(width: float, height: float) -> NDArray[np.float64]:
 def found_for(sides: NDArray[np.float64], padding: float, seed: int = 0) -> tuple[Layout, NDArray[np.float64]]:
     """The layout of boxes, and their outlines in the atlas (k, 4, 2, 2)."""
     outlines = [box(*pair) for pair in sides.tolist()]
-    layout = search(outlines, float(sides.prod(axis=1).sum()), padding, CONFIG, np.random.default_rng(seed))
+    layout = find_layout(outlines, float(sides.prod(axis=1).sum()), padding, CONFIG, np.random.default_rng(seed))
     turned = [outline @ rotation(angle).T for outline, angle in zip(outlines, layout.angle, strict=True)]
     return layout, layout.scale * np.stack(turned) + layout.origin[:, None, None]
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from flexpara.runtime.mesh import Asset, Surface
-from flexpara.runtime.pack.seams import atlas_normals, split_vertices
+from flexpara.runtime.pack.seamvertices import atlas_normals, split_vertices
 
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
 QUAD = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -58,7 +58,7 @@ class _Found:
     keys: NDArray[np.float64]
 
 
-def search(
+def find_layout(
     outlines: list[NDArray[np.float64]], area: float, padding: float, config: PlaceConfig, rng: np.random.Generator
 ) -> Layout:
     """The best layout found.

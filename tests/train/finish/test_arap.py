@@ -9,9 +9,9 @@ from flexpara.runtime.geometry.overlap import flipped_triangles
 from flexpara.runtime.geometry.topology import boundary_loops
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.finish.arap import RigidSteps, gradient, nearest_rotations, unfolded
 from flexpara.train.finish.contact import excess_energy
 from flexpara.train.finish.flatten import circle_map, jacobians
-from flexpara.train.finish.rigid import RigidSteps, gradient, nearest_rotations, unfolded
 
 
 def flat_sheet(resolution: int) -> Surface:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 
 from flexpara.export.metadata import Provenance, bundle_metadata
-from flexpara.export.networks import NetworkSpec, NetworkTruth, build_networks, export_networks, place
+from flexpara.export.onnxfile import NetworkSpec, NetworkTruth, build_networks, export_networks, place
 from flexpara.export.parity import ParityReport, ParitySpec, prove_parity
 from flexpara.export.proven import FileKind
 from flexpara.runtime.errors import InputError, MissingFileError, ParityError, ShapeError
@@ -201,7 +201,7 @@ class Blocked(importlib.abc.MetaPathFinder):
         if name.partition(".")[0] == "torch":
             raise ModuleNotFoundError("torch is not installed here")
 sys.meta_path.insert(0, Blocked())
-import flexpara.export.networks, flexpara.export.wrap, flexpara.train.deploy.fit, flexpara.train.deploy.fit_wrap
+import flexpara.export.onnxfile, flexpara.export.wrapfile, flexpara.train.deploy.fit, flexpara.train.deploy.fit_wrap
 import flexpara.train.deploy.config
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Vertices of an atlas: split along seams, given normals, and rounded to float32 without flipping a triangle.
+"""Seams become vertices: those of an atlas, doubled where uv differ, and their normals.
 
 n file vertices · a atlas vertices · f faces.  uv is v up.
 """
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..mesh import Asset
-
-_REPAIR_ROUNDS = 8
-_STEPS = np.stack(np.meshgrid(np.arange(-2, 3), np.arange(-2, 3)), axis=-1).reshape(-1, 2)
 
 
 def split_vertices(

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from flexpara.export.frames import fold_frame
-from flexpara.export.graph import UnwrapGraph, chart_membership
+from flexpara.export.torchmodel import UnwrapGraph, chart_membership
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.sessions.bundle import BundleMetadata
 
