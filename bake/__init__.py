@@ -3,7 +3,8 @@
 Public face: `bake` (baker.py) makes textures in memory, `output.write_outputs` writes all that a run leaves.
 raster/ finds the surface under each texel, maps/ make values of it, highpoly/ take them from another mesh, files/ write
 them, pictures/ draw the preview.  Imports run in this order: color, heat, lettering, texture, bakemap, settings →
-raster → maps → highpoly, files, seamcheck, closing → pictures, windows → baker → udim, checks, config, output → commands.
+raster → maps → highpoly, files, seamcheck, closing → pictures, windows → baker → udim, checks, config, output →
+commands.
 """
 
 from typing import TYPE_CHECKING

@@ -101,7 +101,8 @@ class Charts:
 
     face_chart: (f,) int64 in [0, k).  corner_uv: (f, 3, 2) float64; inside a chart two faces are joined along an edge
     exactly when their corner uv are equal there.  face_patch: (f,) int64 in [0, p): the Unwrap-Net that answers for it.
-    patch_chart: (p,) int64.  method: per chart "slim", "slit" or "xatlas": how it became valid.
+    patch_chart: (p,) int64.  method: per chart how it became valid: "slim", "slit", "xatlas", "triangle"
+    (one that float32 could not hold beside its neighbours), or "raw" (as learned, not valid).
     """
 
     face_chart: NDArray[np.int64]

@@ -1,1 +1,1 @@
-"""The networks that are exported, and their inverse: gates and affine experts, fitted to finished charts in closed form."""
+"""The networks that are exported, and their inverse: gates and affine experts, fitted to charts in closed form."""
