@@ -237,6 +237,7 @@ class UnwrapResult:
         maps = chosen_maps(outputs, seed=self.report["settings"]["seed"])
         check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
+        report["changes"] = {**report["changes"], **outputs.lost(self.asset)}
         networks = {"onnx": self.onnx}
         if self.found.paper is not None:
             networks["paper.onnx"] = self.found.paper

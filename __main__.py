@@ -110,7 +110,7 @@ def _perform(run: Run, console: Console) -> int:
     with console.progress() as progress:
         source = load_any(run.mesh)
         if isinstance(source, Asset):  # of points more is known when triangles lie over them
-            console.note_changes(source)
+            console.note_changes(source, run.outputs.lost(source))
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
             if isinstance(source, Asset):
                 outputs = run.outputs.for_asset(source)
@@ -192,7 +192,7 @@ def export(
     from .runtime.files import OutputFolder
 
     asset = load(mesh)
-    console.note_changes(asset)
+    console.note_changes(asset, outputs.lost(asset))
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
         outputs = outputs.for_asset(asset)
         check_outputs(folder, outputs, chosen_maps(outputs))

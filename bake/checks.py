@@ -73,14 +73,16 @@ def check_outputs(
         check_green(outputs)
     names = [*possible_files(output.stem, outputs, maps), *more]
     if meshes:
-        endings = (*outputs.formats, "onnx", *(("wrap.onnx",) if outputs.inverse else ()))
+        endings = [*outputs.formats, "onnx"]
+        endings += ["bin"] if "gltf" in outputs.formats else []
+        endings += ["wrap.onnx"] if outputs.inverse else []
         names += [f"{output.stem}.{ending}" for ending in endings]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
     output.check([*names, output.report_name])
     wanted = {
         "baker": bool(maps),
         "files.images": bool(maps),
-        "files.gltf": meshes and "glb" in outputs.formats,
+        "files.gltf": meshes and bool({"glb", "gltf"} & set(outputs.formats)),
         "pictures.preview": outputs.preview,
     }
     with requires("bake"):

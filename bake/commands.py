@@ -161,4 +161,4 @@ def _high_source(options: HighOptions) -> HighSource | None:
         if isinstance(error, InputError):
             raise
         cage = CageSettings(cage=load_asset(Path(options.cage)), match_names=options.match_names)
-    return HighSource([load_asset(path) for path in options.high], cage)
+    return HighSource([load_asset(path, instances=True) for path in options.high], cage)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import MissingDependencyError
 from ..runtime.extras import requires
+from ..runtime.io.gltf.instances import every_instance
+from ..runtime.options import SCENES
 from .checks import exr_settings
 
 if TYPE_CHECKING:
@@ -132,13 +134,15 @@ def write_meshes(
     output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked, *, apart: bool = False
 ) -> dict[str, dict[str, Any]]:
     """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
-    from .files.written import written_report
+    from .files.written import Reading, parts_of, written_report
 
+    spread, own = every_instance(atlas, asset)
     writers: dict[str, Callable[[Path], None]] = {
-        "glb": lambda path: _write_glb(atlas, asset, baked, path),
-        "obj": lambda path: _write_obj(atlas, baked, path),
-        "ply": lambda path: _write_ply(atlas, asset, path),
-        "usda": lambda path: _write_usda(atlas, asset, baked, path),
+        "glb": lambda path: _write_gltf(atlas, asset, baked, path),
+        "gltf": lambda path: _write_gltf(atlas, asset, baked, path),
+        "obj": lambda path: _write_obj(spread, baked, path),
+        "ply": lambda path: _write_ply(spread, asset, path),
+        "usda": lambda path: _write_usda(spread, asset, baked, path),
     }
     staged: dict[str, Path] = {}
 
@@ -148,19 +152,25 @@ def write_meshes(
 
     for kind in (name for name in writers if name in outputs.formats):
         output.write(f"{output.stem}.{kind}", partial(write, kind))
-    return written_report(staged, atlas.uv[atlas.faces], apart=apart)
+    uv = atlas.uv[atlas.faces]
+    order, parts = parts_of(atlas, asset)
+    scenes = {kind: path for kind, path in staged.items() if kind in SCENES}
+    plain = {kind: path for kind, path in staged.items() if kind not in SCENES}
+    return {
+        **written_report(scenes, uv[order], Reading(apart=apart, parts=parts)),
+        **written_report(plain, uv, Reading(apart=apart, faces=own)),
+    }
 
 
-def _write_glb(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
-    """With its normal map green up, as glTF wants it, whatever the files beside it are."""
+def _write_gltf(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
+    """A .glb or .gltf file: the source's own document with new uv, where it is one."""
     with requires("bake"):
         from .files.gltf import write_glb
-        from .files.targets import GLTF, with_green
-    textures = {
-        name: with_green(texture, GLTF.green) if name == "normal" else texture
-        for name, texture in baked.textures.items()
-    }
-    write_glb(atlas, asset, textures, path)
+        from .files.gltfscene import Page, write_scene
+    if asset.document is None:
+        write_glb(atlas, asset, baked.textures, path)
+    else:
+        write_scene([Page(atlas, asset, baked.textures)], path)
 
 
 def _write_obj(atlas: Atlas, baked: Baked, path: Path) -> None:

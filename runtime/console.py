@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from .errors import InputError
 from .extras import PACKAGE
 from .options import Flag
 from .progress import progress_bars
@@ -45,17 +46,25 @@ class Console:
     """Print neither progress nor notes nor a summary; errors are still printed."""
     force: Flag = False
     """Overwrite files that flexpara did not write."""
+    strict: Flag = False
+    """End with an error, before the work, where something in the file would be lost or changed."""
 
     def show(self, numbers: dict[str, Any], files: Sequence[Path]) -> None:
         """The summary on stdout, one figure a line, then the files; nothing when quiet."""
         if not self.quiet:
             show(numbers, files)
 
-    def note_changes(self, source: Asset | PointCloud) -> None:
-        """A note on what reading and cleaning could not take as it was, where there is something to say."""
+    def note_changes(self, source: Asset | PointCloud, lost: Mapping[str, int] | None = None) -> None:
+        """A note for each thing that could not be read as it was, or that is not in what will be written (lost).
+
+        Raises: InputError that names them all, when strict.
+        """
         from .io.changes import told
 
-        if fact := told(source.changes):
+        facts = told({**source.changes, **(lost or {})})
+        if self.strict and facts:
+            raise InputError(f"{source.stem}: {'; '.join(facts)}: expected no change, as asked; leave --strict out")
+        for fact in facts:
             self.note(f"{source.stem}: {fact}")
 
     def note(self, fact: str) -> None:

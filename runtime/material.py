@@ -6,11 +6,13 @@ as stored, row 0 = top: sRGB in the slots base-color and emissive, data in the o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+
+from .errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,6 +24,14 @@ Slot = Literal["base-color", "metallic-roughness", "normal", "emissive", "occlus
 AlphaMode = Literal["OPAQUE", "MASK", "BLEND"]
 Placement = tuple[tuple[float, float, float], tuple[float, float, float]]
 SLOTS: tuple[Slot, ...] = ("base-color", "metallic-roughness", "normal", "emissive", "occlusion")
+READ_BY: Mapping[Slot, tuple[str, ...]] = {
+    "base-color": ("base-color",),
+    "metallic-roughness": ("metallic-roughness", "orm"),
+    "normal": ("normal",),
+    "emissive": ("emissive",),
+    "occlusion": ("occlusion", "orm"),
+}
+"""Maps that each texture goes into."""
 UNTURNED: Placement = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
@@ -49,6 +59,8 @@ class Material:
     emissive: linear RGB factor ≥ 0, above 1 where the file asks for more (KHR_materials_emissive_strength).
     alpha_mode: OPAQUE ignores alpha, MASK cuts at alpha_cutoff.  double_sided: seen from behind too.
     tinted: vertex colours multiply the base colour's texture, as glTF asks; otherwise they show only without one.
+    unread: slots that have a picture which is not among the pictures → why, as words that follow "its texture"; ""
+        where it could be read and lies on another uv set.
     """
 
     name: str = "material"
@@ -63,6 +75,7 @@ class Material:
     alpha_cutoff: float = 0.5
     double_sided: bool = False
     tinted: bool = True
+    unread: Mapping[Slot, str] = field(default_factory=dict)
 
     @property
     def finish(self) -> tuple[float, float]:
@@ -90,7 +103,10 @@ def source_maps(asset: Asset) -> tuple[str, ...]:
     something glows.  What is the same all over needs no map: it stays a factor.
     """
     used = used_materials(asset)
-    has = {slot: asset.uv is not None and any(slot in entry.pictures for entry in used) for slot in SLOTS}
+    has = {
+        slot: any((asset.uv is not None and slot in entry.pictures) or entry.unread.get(slot) for entry in used)
+        for slot in SLOTS
+    }
     finish = has["metallic-roughness"] or len({entry.finish for entry in used}) > 1
     colors = {entry.base_color_factor for entry in used}
     names = ["normal"] if has["normal"] else []
@@ -100,3 +116,18 @@ def source_maps(asset: Asset) -> tuple[str, ...]:
     else:
         names += [name for name, there in (("metallic-roughness", finish), ("occlusion", has["occlusion"])) if there]
     return (*names, *(["emissive"] if has["emissive"] or len({entry.emissive for entry in used}) > 1 else []))
+
+
+def refuse_unread(asset: Asset, maps: Sequence[str]) -> None:
+    """Refuse maps of textures that could not be read.  maps: their names.
+
+    Raises: InputError that names the first of them.
+    """
+    for entry in used_materials(asset):
+        for slot, why in entry.unread.items():
+            wanted = [name for name in maps if name in READ_BY[slot]]
+            if why and wanted:
+                raise InputError(
+                    f"the {slot} texture of material {entry.name} {why}, and the map {wanted[0]} is made of it; save "
+                    "it as PNG, or pass --maps none, which leaves all materials as they are"
+                )

@@ -31,7 +31,9 @@ MODES = ("multi-chart", "global")
 PRECISIONS = ("float32", "bfloat16")
 ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirectional", "chart-differential")
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
-FORMATS = ("glb", "obj", "ply", "usda")
+FORMATS = ("glb", "gltf", "obj", "ply", "usda")
+SCENES = ("glb", "gltf")
+"""Formats that hold scenes."""
 LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
@@ -214,7 +216,8 @@ class FileOptions:
     """What is written beside the ONNX file, the maps and the report."""
 
     formats: Annotated[Names, Parameter(name="--format")] = ("glb",)
-    """Mesh files to write: some of glb, obj, ply, usda."""
+    """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda.  glb and gltf keep all that a
+    glTF scene holds."""
     inverse: Flag = False
     """Also write STEM.wrap.onnx, the network from uv and chart to point and normal."""
     preview: bool | None = None
@@ -241,13 +244,23 @@ class Outputs(FileOptions, MapOptions):
         demand(not (self.layers and named), f"{found}, expected glb or ply; leave one of the two out")
 
     def for_asset(self, asset: "Asset") -> "Outputs":
-        """The same for one mesh: "auto" replaced by the maps it stands for, each map once, and preview decided."""
-        from .material import source_maps
+        """The same for one mesh: "auto" replaced by the maps it stands for, each map once, and preview decided.
+
+        Raises: InputError for a map of textures that could not be read.
+        """
+        from .material import refuse_unread, source_maps
 
         auto = source_maps(asset)
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
+        refuse_unread(asset, maps)
         drawn = bool(self.maps) if self.preview is None else self.preview
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
+
+    def lost(self, asset: "Asset") -> dict[str, int]:
+        """What is in the file of the mesh and in nothing that will be written, name → count."""
+        if asset.document is None or not set(SCENES).isdisjoint(self.formats):
+            return {}
+        return asset.document.beyond_meshes()
 
     def for_points(self) -> "Outputs":
         """The same without the triangles as ply, whose name the points have; glb where that leaves none."""

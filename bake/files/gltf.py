@@ -14,6 +14,8 @@ import numpy as np
 
 from ... import __version__
 from ...runtime.errors import ShapeError
+from ...runtime.io.gltf.buffers import parse_tree
+from ...runtime.io.gltf.editing import save
 from ..color import linear_from_srgb
 from ..maps.tangents import unit, vertex_tangents
 from .glbbuffer import Buffer, gl
@@ -40,8 +42,13 @@ def write_glb(
     *,
     metadata: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write the atlas and its textures as one .glb file.  Arguments and errors as `glb_bytes`."""
-    path.write_bytes(glb_bytes(atlas, asset, textures, metadata=metadata))
+    """Write the atlas and its textures as a .glb file, or as .gltf and .bin.  Arguments and errors as `glb_bytes`."""
+    data = glb_bytes(atlas, asset, textures, metadata=metadata)
+    if path.suffix == ".glb":
+        path.write_bytes(data)
+    else:
+        tree, binary = parse_tree(data)
+        save(tree, binary or b"", path)
 
 
 def glb_bytes(

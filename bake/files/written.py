@@ -19,16 +19,28 @@ from ...runtime.errors import MeshError
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from ...runtime.mesh import Asset, Atlas
 
 READ_BACK = 500_000
 """Faces up to which files are read back; of larger meshes the arrays that were serialized are judged."""
 COMPONENTS = {5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's numbers of component types."""
 PLY_TYPES = {"double": "<f8", "float": "<f4", "int": "<i4", "uchar": "u1"}
+
+
+@dataclass(frozen=True)
+class PartUv:
+    """Where uv lie in a glTF file: a primitive, the set of its uv, whether its faces wind the other way."""
+
+    mesh: int = 0
+    primitive: int = 0
+    coordinates: int = 0
+    mirrored: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,29 +57,50 @@ class WrittenUv:
     read_back: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What is read of files.
+
+    apart: whether no two triangles are known to overlap; files that hold the same are not tested again.
+    parts: of glTF files, in the order of the faces.  faces: (f,) int64 of other files, None is all of them.
+    most: faces of a file that is read.
+    """
+
+    apart: bool = False
+    parts: Sequence[PartUv] = (PartUv(),)
+    faces: NDArray[np.int64] | None = None
+    most: int = READ_BACK
+
+
+def parts_of(atlas: Atlas, asset: Asset) -> tuple[NDArray[np.int64], list[PartUv]]:
+    """The order (f,) of the atlas' faces in a glTF file, part after part, and where the uv of each part lie in it."""
+    document, origin = asset.document, asset.origin
+    if document is None or origin is None:
+        return np.arange(len(atlas.faces)), [PartUv()]
+    part_of = document.part_of(origin[atlas.source_vertex[atlas.faces[:, 0]]])
+    parts = [document.parts[int(number)] for number in np.unique(part_of)]
+    places = [PartUv(part.mesh, part.primitive, mirrored=part.mirrored) for part in parts]
+    return np.argsort(part_of, kind="stable"), places
+
+
 def written_report(
-    files: Mapping[str, Path | None],
-    corner_uv: NDArray[np.float32],
-    *,
-    apart: bool = False,
-    read_back: int = READ_BACK,
+    files: Mapping[str, Path | None], corner_uv: NDArray[np.float32], reading: Reading | None = None
 ) -> dict[str, dict[str, Any]]:
     """Format → fields of `WrittenUv`.
 
     Args:
         files: format → the file, or None for one that is not kept.
         corner_uv: (f, 3, 2) float32 v up, what was to be written.
-        apart: whether no two of their triangles are known to overlap; files that hold the same are not tested again.
-        read_back: most faces of a file that is read.
+        reading: what is read of them; None is everything.
 
     Raises: MeshError when a file does not hold what its format asks for.
     """
-    wanted = corner_uv.astype(np.float64)
-    known = [(wanted, _judged(wanted, apart=apart))]
+    reading, wanted = reading or Reading(), corner_uv.astype(np.float64)
+    known = [(wanted, _judged(wanted, apart=reading.apart))]
     report: dict[str, dict[str, Any]] = {}
     for kind, path in files.items():
-        reads = path is not None and len(wanted) <= read_back
-        uv = corner_uv_of(path) if path is not None and reads else serialized(corner_uv, kind)
+        reads = path is not None and len(wanted) <= reading.most
+        uv = corner_uv_of(path, reading) if path is not None and reads else serialized(corner_uv, kind)
         same = next((found for other, found in known if np.array_equal(other, uv)), None)
         found = _judged(uv) if same is None else same
         known.append((uv, found))
@@ -78,21 +111,29 @@ def written_report(
 def serialized(corner_uv: NDArray[np.float32], kind: str) -> NDArray[np.float64]:
     """(f, 3, 2) float64 v up: uv as a file of that kind holds them, which rounds 1 − v to float32 if it is glTF."""
     uv = corner_uv.astype(np.float64)
-    if kind == "glb":
+    if kind in ("glb", "gltf"):
         uv[..., 1] = 1.0 - (1.0 - uv[..., 1]).astype(np.float32).astype(np.float64)
     return uv
 
 
-def corner_uv_of(path: Path) -> NDArray[np.float64]:
-    """(f, 3, 2) float64 v up of a .glb, .obj, .ply or .usda file of one mesh of triangles.
+def corner_uv_of(path: Path, reading: Reading | None = None) -> NDArray[np.float64]:
+    """(f, 3, 2) float64 v up of a .glb, .gltf, .obj, .ply or .usda file.
+
+    reading: the parts of a glTF file, or the faces of another, that are read; None is one mesh, all of it.
 
     Raises: MeshError for another ending or a file without such uv.
     """
-    readers = {".glb": _glb_uv, ".obj": _obj_uv, ".ply": _ply_uv, ".usda": _usda_uv}
-    if path.suffix not in readers:
-        raise MeshError(f"{path.name}: expected one of {', '.join(readers)}; name a mesh file that flexpara wrote")
+    reading = reading or Reading()
+    readers = {".obj": _obj_uv, ".ply": _ply_uv, ".usda": _usda_uv}
+    if path.suffix not in (*readers, ".glb", ".gltf"):
+        known = ", ".join((".glb", ".gltf", *readers))
+        raise MeshError(f"{path.name}: expected one of {known}; name a mesh file that flexpara wrote")
     try:
-        return readers[path.suffix](path.read_bytes())
+        if path.suffix in readers:
+            uv = readers[path.suffix](path.read_bytes())
+            return uv if reading.faces is None else uv[reading.faces]
+        document, data = _gltf_chunks(path)
+        return np.concatenate([_primitive_uv(document, data, part) for part in reading.parts])
     except (ValueError, KeyError, IndexError, AttributeError, struct.error) as error:
         raise MeshError(f"{path.name} holds no triangles with uv ({error}); it was not written whole") from error
 
@@ -102,23 +143,32 @@ def _judged(uv: NDArray[np.float64], *, apart: bool = False) -> tuple[int, int]:
     return int(flipped_triangles(uv).sum()), 0 if apart else len(overlapping_pairs(uv))
 
 
-def _glb_uv(data: bytes) -> NDArray[np.float64]:
-    """Accessors of the first primitive, out of the two chunks of a GLB file."""
+def _gltf_chunks(path: Path) -> tuple[dict[str, Any], bytes]:
+    """JSON and buffer: the two chunks of a GLB file, or a .gltf file and the one beside it."""
+    data = path.read_bytes()
+    if path.suffix == ".gltf":
+        document = json.loads(data)
+        return document, path.with_name(document["buffers"][0]["uri"]).read_bytes()
     (size,) = struct.unpack_from("<I", data, 12)
-    document, start = json.loads(data[20 : 20 + size]), 28 + size
-    primitive = document["meshes"][0]["primitives"][0]
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def _primitive_uv(document: dict[str, Any], data: bytes, part: PartUv) -> NDArray[np.float64]:
+    """(f, 3, 2) uv of the triangles of one primitive."""
+    primitive = document["meshes"][part.mesh]["primitives"][part.primitive]
 
     def accessor(number: int) -> NDArray[Any]:
         found = document["accessors"][number]
         view = document["bufferViews"][found["bufferView"]]
-        offset = start + view.get("byteOffset", 0) + found.get("byteOffset", 0)
+        offset = view.get("byteOffset", 0) + found.get("byteOffset", 0)
         width = {"SCALAR": 1, "VEC2": 2}[found["type"]]
         values = np.frombuffer(data, COMPONENTS[found["componentType"]], found["count"] * width, offset)
         return values.reshape(found["count"], width)
 
-    uv = accessor(primitive["attributes"]["TEXCOORD_0"]).astype(np.float64)
+    uv = accessor(primitive["attributes"][f"TEXCOORD_{part.coordinates}"]).astype(np.float64)
     uv[:, 1] = 1.0 - uv[:, 1]
-    return uv[accessor(primitive["indices"]).reshape(-1, 3).astype(np.int64)]
+    faces = accessor(primitive["indices"]).reshape(-1, 3).astype(np.int64)
+    return uv[faces[:, [0, 2, 1]] if part.mirrored else faces]
 
 
 def _obj_uv(data: bytes) -> NDArray[np.float64]:

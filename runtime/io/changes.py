@@ -1,4 +1,4 @@
-"""What reading and cleaning could not take as it was, in words: one line for the user.
+"""What reading and cleaning could not take as it was, in words: a line each for the user.
 
 Counts that tell a reader of the report something, but change nothing that the user would miss, stay unsaid: vertices
 that were welded or that no face uses, and how many parts there are.
@@ -35,7 +35,8 @@ WORDS = {
     "skipped_points": "{} left out|point element|point elements",
     "skipped_primitives": "{} of points or lines left out|primitive|primitives",
     "skipped_skins": "{} left out: the mesh stands as it was modelled|skin|skins",
-    "textures_of_other_uv": "{} on a second uv set left out|texture|textures",
+    "textures_not_decoded": "{} in a format that is not decoded, not baked|texture|textures",
+    "textures_of_other_uv": "{} on a second uv set not baked|texture|textures",
     "trailing_bytes": "{} behind the last triangle left out|byte|bytes",
     "uv_not_finite": "uv of {} not finite, set to 0|vertex|vertices",
     "vertices_without_colors": "{} without colours made white|vertex|vertices",
@@ -43,13 +44,13 @@ WORDS = {
 }
 
 
-def told(changes: Mapping[str, int]) -> str:
-    """One line without a full stop, "" where there is nothing to say.
+def told(changes: Mapping[str, int]) -> list[str]:
+    """A line without a full stop for each change that a user would miss.
 
     >>> told({"degenerate_faces": 1, "flipped_faces": 298, "components": 3})
-    '1 face without area left out; 298 faces turned to agree with the others around'
+    ['1 face without area left out', '298 faces turned to agree with the others around']
     """
-    return "; ".join(_clause(name, count) for name, count in changes.items() if count and name not in UNSAID)
+    return [_clause(name, count) for name, count in changes.items() if count and name not in UNSAID]
 
 
 def _clause(name: str, count: int) -> str:

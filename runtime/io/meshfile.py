@@ -38,11 +38,12 @@ if TYPE_CHECKING:
 MAX_BYTES = 8 << 30
 
 
-def load_asset(path: Path) -> Asset:
+def load_asset(path: Path, *, instances: bool = False) -> Asset:
     """Read and clean a mesh file.
 
     Args:
         path: obj, ply, stl, glb, gltf, off, or another format that trimesh reads.
+        instances: each mesh of a scene wherever it stands; otherwise once, with the scene as its document.
 
     Returns:
         The Asset; its changes say what cleaning did and what could not be kept.
@@ -65,7 +66,7 @@ def load_asset(path: Path) -> Asset:
         )
     data = path.read_bytes()
     try:
-        return clean(_read(data, path), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
+        return clean(_read(data, path, instances=instances), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
     except InputError as error:
         raise MeshError(f"{path}: {error}") from error
 
@@ -131,15 +132,15 @@ def _array(name: str, values: ArrayLike, columns: tuple[int, ...], kinds: str, r
     return array
 
 
-def _read(data: bytes, path: Path) -> RawMesh:
+def _read(data: bytes, path: Path, *, instances: bool) -> RawMesh:
     kind, folder = path.suffix.lower().removeprefix("."), path.parent
     readers: dict[str, Callable[[], RawMesh]] = {
         "obj": lambda: read_obj(data, partial(read_in_folder, folder)),
         "ply": lambda: read_ply(data, partial(read_in_folder, folder)),
         "stl": lambda: read_stl(data),
         "off": lambda: read_off(data),
-        "glb": lambda: read_gltf(data, folder),
-        "gltf": lambda: read_gltf(data, folder),
+        "glb": lambda: read_gltf(data, folder, instances=instances),
+        "gltf": lambda: read_gltf(data, folder, instances=instances),
     }
     if kind in readers:
         return readers[kind]()

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from .gltf.document import Document
+
 LARGEST_DIAGONAL = 1e100  # beyond, areas leave the range of float64
 MAX_FACES = 20_000_000
 
@@ -29,6 +31,8 @@ class RawMesh:
     positions: (n, 3) float64.  faces: (f, 3) int64 into positions.  normals: (n, 3) float64 or None.
     colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
     face_material: (f,) int64 into materials, or None.  changes: what reading could not keep, name → count.
+    origin: (n,) int64, the row of the document that each vertex is, or None.  body: (n,) int64, the object that each
+    vertex belongs to; vertices of two bodies are never one.  document: the file that these triangles are part of.
     """
 
     positions: NDArray[np.float64]
@@ -39,6 +43,9 @@ class RawMesh:
     materials: tuple[Material, ...] = ()
     face_material: NDArray[np.int64] | None = None
     changes: dict[str, int] = field(default_factory=dict)
+    origin: NDArray[np.int64] | None = None
+    body: NDArray[np.int64] | None = None
+    document: Document | None = None
 
 
 def check(raw: RawMesh) -> None:
@@ -82,6 +89,8 @@ def with_vertices(part: RawMesh, chosen: NDArray[np.int64], faces: NDArray[np.in
         normals=None if part.normals is None else part.normals[chosen],
         colors=None if part.colors is None else part.colors[chosen],
         uv=None if part.uv is None else part.uv[chosen],
+        origin=None if part.origin is None else part.origin[chosen],
+        body=None if part.body is None else part.body[chosen],
     )
 
 
@@ -145,7 +154,14 @@ def merge(parts: Sequence[RawMesh]) -> RawMesh:
         materials=materials,
         face_material=face_material,
         changes=changes,
+        origin=_joined_numbers([part.origin for part in parts]),
+        body=_joined_numbers([part.body for part in parts]),
     )
+
+
+def _joined_numbers(columns: Sequence[NDArray[np.int64] | None]) -> NDArray[np.int64] | None:
+    given = [column for column in columns if column is not None]
+    return np.concatenate(given) if len(given) == len(columns) else None
 
 
 def _joined_colors(parts: Sequence[RawMesh], changes: dict[str, int]) -> NDArray[np.uint8] | None:

@@ -32,7 +32,7 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
     check(raw)
     used, faces = np.unique(raw.faces, return_inverse=True)
     part = with_vertices(raw, used, faces.reshape(-1, 3))
-    weld = weld_vertices(part.positions, part.faces)
+    weld = weld_vertices(part.positions, part.faces, part.body)
     proper = ~degenerate_faces(part.positions[first_of_each(weld)], weld[part.faces])
     if not proper.any():
         raise MeshError(
@@ -97,6 +97,8 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         changes={name: count for name, count in counts.items() if count},
         sha256=sha256,
         stem=stem,
+        origin=part.origin,
+        document=part.document,
     )
 
 

@@ -28,8 +28,10 @@ SMALLEST_DIAGONAL = 1e-100
 """Below, areas leave the range of float64."""
 
 
-def weld_vertices(positions: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
-    """Which vertices are one: equal positions, or a chain of them that are very near.
+def weld_vertices(
+    positions: NDArray[np.float64], faces: NDArray[np.int64] | None = None, body: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """Which vertices are one: equal positions, or a chain of them that are very near, in one body.
 
     Very near is closer than WELD_TOLERANCE × bounding-box diagonal, and than WELD_SHARE × the longest edge around
     either of them.
@@ -37,6 +39,7 @@ def weld_vertices(positions: NDArray[np.float64], faces: NDArray[np.int64] | Non
     Args:
         positions: (n, 3) float64, finite.
         faces: (f, 3) int64, whose edges set that limit; None sets none.
+        body: (n,) int64, the body of each vertex; None is one body.
 
     Returns:
         (n,) int64 in [0, v), numbered by first appearance: the welded vertex of each file vertex.
@@ -50,9 +53,13 @@ def weld_vertices(positions: NDArray[np.float64], faces: NDArray[np.int64] | Non
             f"the bounding box has diagonal {diagonal:.3g}, expected {SMALLEST_DIAGONAL:g} to {LARGEST_DIAGONAL:g}; "
             "check the mesh and its unit"
         )
-    group = equal_rows(positions)
-    distinct = positions[first_of_each(group)]
+    rows = positions if body is None else np.column_stack([positions, body.astype(np.float64)])
+    group = equal_rows(rows)
+    first = first_of_each(group)
+    distinct = positions[first]
     pairs = KDTree(distinct).query_pairs(WELD_TOLERANCE * diagonal, output_type="ndarray")
+    if body is not None:
+        pairs = pairs[body[first[pairs[:, 0]]] == body[first[pairs[:, 1]]]]
     if len(pairs) and faces is not None:
         farthest = longest_edges(distinct, group[faces])
         apart = np.linalg.norm(distinct[pairs[:, 0]] - distinct[pairs[:, 1]], axis=1)

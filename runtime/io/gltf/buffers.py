@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 READ_EXTENSIONS = (DRACO, *MESHOPT, "KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_lights_", "EXT_lights_")
 READ_EXTENSIONS += ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_animation_", "KHR_xmp")
 """Beginnings of extensions that are read, or that say nothing about the shape."""
@@ -143,6 +143,11 @@ def _table(
 
 def read_accessor(file: GltfFile, index: int) -> NDArray[Any]:
     """(count, columns): float64 where the component is float or normalized, else its integer type."""
+    return as_stored(file, index, stored_accessor(file, index))
+
+
+def stored_accessor(file: GltfFile, index: int) -> NDArray[Any]:
+    """(count, columns) as stored: of the accessor's component type, whatever it means."""
     accessor = file.tree["accessors"][index]
     dtype, columns, count = COMPONENTS[accessor["componentType"]], COLUMNS[accessor["type"]], accessor["count"]
     if not 0 < count <= 3 * MAX_FACES:
@@ -163,7 +168,7 @@ def read_accessor(file: GltfFile, index: int) -> NDArray[Any]:
         entries, _ = buffer_view(file, what["bufferView"])
         place = _table(places, where.get("byteOffset", 0), np.dtype(kind).itemsize, sparse["count"], kind, 1)[:, 0]
         values[place] = _table(entries, what.get("byteOffset", 0), width, sparse["count"], dtype, columns)
-    return as_stored(file, index, values)
+    return values
 
 
 def as_stored(file: GltfFile, index: int, values: NDArray[Any]) -> NDArray[Any]:

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from ...material import AlphaMode, Placement, Slot, Wrap
 
 TRANSFORM = "KHR_texture_transform"
+WEBP = "EXT_texture_webp"
 STRENGTH = "KHR_materials_emissive_strength"
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
 ALPHA_MODES: tuple[AlphaMode, ...] = ("OPAQUE", "MASK", "BLEND")
-COUNTS = ("missing_textures", "textures_of_other_uv")
+COUNTS = ("textures_not_decoded", "textures_of_other_uv")
 
 
 def read_materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
@@ -73,10 +74,12 @@ def _material(
     """One material; known and changes grow."""
     infos, first = _texture_infos(entry), uv_set(entry)
     pictures: dict[Slot, Picture] = {}
+    unread: dict[Slot, str] = {}
     for slot, info in infos.items():
         pixels = _pixels(file, info, known)
-        if pixels is None or _coordinates(info) != first:
-            changes["missing_textures" if pixels is None else "textures_of_other_uv"] += 1
+        if isinstance(pixels, str) or _coordinates(info) != first:
+            changes["textures_not_decoded" if isinstance(pixels, str) else "textures_of_other_uv"] += 1
+            unread[slot] = pixels if isinstance(pixels, str) else ""
         else:
             pictures[slot] = _picture(file, info, pixels)
     surface = entry.get("pbrMetallicRoughness", {})
@@ -96,6 +99,7 @@ def _material(
         alpha_mode=ALPHA_MODES[ALPHA_MODES.index(mode)],
         alpha_cutoff=max(finite(entry.get("alphaCutoff", 0.5)), 0.0),
         double_sided=bool(entry.get("doubleSided", False)),
+        unread=unread,
     )
 
 
@@ -104,20 +108,27 @@ def _unit(value: Any) -> float:
     return min(max(finite(value), 0.0), 1.0)
 
 
-def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | None:
-    """The picture of a textureInfo, decoded once, or None where none that is read is named."""
+def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | str:
+    """The picture of a textureInfo, decoded once, or why none can be had."""
     texture = file.tree["textures"][info["index"]]
-    source = texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
-    if source is None:
-        return None
-    if source not in known:
-        image = file.tree["images"][source]
-        embedded = "bufferView" in image
-        data = (
-            bytes(buffer_view(file, image["bufferView"])[0]) if embedded else read_resource(image["uri"], file.folder)
-        )
-        known[source] = decode_image(data)
-    return known[source]
+    sources = [holder["source"] for holder in (texture, *_webp(texture)) if "source" in holder]
+    if not sources:
+        names = ", ".join(texture.get("extensions", {})) or "no extension"
+        return f"has its picture in {names}, which is not read"
+    if sources[0] not in known:
+        known[sources[0]] = decode_image(image_bytes(file, sources[0]))
+    return known[sources[0]]
+
+
+def _webp(texture: dict[str, Any]) -> list[dict[str, Any]]:
+    return [texture["extensions"][WEBP]] if WEBP in texture.get("extensions", {}) else []
+
+
+def image_bytes(file: GltfFile, index: int) -> bytes:
+    """The picture file of an image, embedded or beside the document."""
+    image = file.tree["images"][index]
+    embedded = "bufferView" in image
+    return bytes(buffer_view(file, image["bufferView"])[0]) if embedded else read_resource(image["uri"], file.folder)
 
 
 def _picture(file: GltfFile, info: dict[str, Any], pixels: NDArray[np.uint8]) -> Picture:

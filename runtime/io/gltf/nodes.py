@@ -5,6 +5,7 @@ Words of the specification (Khronos, glTF 2.0.1): node, scene; and of EXT_mesh_g
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,49 +15,100 @@ from ..rawmesh import MAX_FACES
 from .buffers import GltfFile, read_accessor
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
 INSTANCING = "EXT_mesh_gpu_instancing"
-LIGHTS = "KHR_lights_punctual"
+UNEVEN = 1e-3
+"""Relative difference of a matrix's scales below which they count as equal."""
 
 
-def placed_meshes(file: GltfFile) -> list[tuple[int, NDArray[np.float64]]]:
-    """(mesh, node → world matrix) of each mesh and instance, depth first in the order of the default scene.
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A place where a mesh stands.
+
+    mesh, node: its numbers.  world: (4, 4) float64, mesh → world, column vectors.  first: in the first scene read.
+    """
+
+    mesh: int
+    node: int
+    world: NDArray[np.float64]
+    first: bool = True
+
+    @property
+    def unlikeness(self) -> tuple[bool, int]:
+        """Whether it mirrors, and how unevenly it scales in steps of `UNEVEN`: what unwraps best has the least."""
+        scales = np.linalg.svd(self.world[:3, :3], compute_uv=False)
+        spread = float(scales[0] / max(scales[2], np.finfo(np.float64).tiny))
+        return bool(np.linalg.det(self.world[:3, :3]) < 0.0), round(min(np.log(spread), 100.0) / UNEVEN)
+
+
+def placed_meshes(file: GltfFile) -> list[Placement]:
+    """Where each mesh and instance stands: depth first, the default scene before the others.
+
+    A mesh with a skin stands where the first joint takes it; its own node has no say (glTF 2.0, section 3.7.3.3).
 
     Raises: MeshError where nodes form no tree.
     """
-    tree = file.tree
-    nodes = tree.get("nodes", [])
-    children = {child for node in nodes for child in node.get("children", [])}
-    scenes = tree.get("scenes", [])
-    roots = (
-        scenes[tree.get("scene", 0)].get("nodes", []) if scenes else [i for i in range(len(nodes)) if i not in children]
-    )
-    waiting, seen, placed = [(root, np.eye(4)) for root in reversed(roots)], set(), []
+    nodes = file.tree.get("nodes", [])
+    world: dict[int, NDArray[np.float64]] = {}
+    placed: list[tuple[int, bool]] = []
+    for number, roots in enumerate(_scenes(file.tree)):
+        found = _worlds(nodes, roots)
+        placed += [(index, number == 0) for index in found if "mesh" in nodes[index] and index not in world]
+        world |= {index: matrix for index, matrix in found.items() if index not in world}
+    return [
+        Placement(nodes[index]["mesh"], index, matrix, first)
+        for index, first in placed
+        for matrix in _standing(file, index, world)
+    ]
+
+
+def best_placements(placements: Sequence[Placement]) -> list[Placement]:
+    """One for each mesh, in the order of their first: not mirrored and evenly scaled where the scene has such a one."""
+    found: dict[int, Placement] = {}
+    for placement in placements:
+        known = found.setdefault(placement.mesh, placement)
+        if placement.unlikeness < known.unlikeness:
+            found[placement.mesh] = placement
+    return list(found.values())
+
+
+def _scenes(tree: dict[str, Any]) -> list[list[int]]:
+    """Root nodes of each scene, the default one first; without scenes all nodes that are nobody's child."""
+    nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
+    if not scenes:
+        children = {child for node in nodes for child in node.get("children", [])}
+        return [[index for index in range(len(nodes)) if index not in children]]
+    default = int(tree.get("scene", 0))
+    return [scenes[index].get("nodes", []) for index in (default, *(i for i in range(len(scenes)) if i != default))]
+
+
+def _worlds(nodes: Sequence[dict[str, Any]], roots: Sequence[int]) -> dict[int, NDArray[np.float64]]:
+    """Node → world matrix of all nodes below the roots, depth first.  Raises: MeshError where they form no tree."""
+    waiting, world = [(root, np.eye(4)) for root in reversed(roots)], {}
     while waiting:
         index, parent = waiting.pop()
-        if index in seen:
+        if index in world:
             raise MeshError(
                 f"glTF node {index} has several parents or is its own ancestor, expected a tree; export again"
             )
-        seen.add(index)
-        world = parent @ _local_matrix(nodes[index])
-        if "mesh" in nodes[index]:
-            placed += [(nodes[index]["mesh"], world @ own) for own in _instances(file, nodes[index])]
-        waiting += [(child, world) for child in reversed(nodes[index].get("children", []))]
-    return placed
+        world[index] = parent @ _local_matrix(nodes[index])
+        waiting += [(child, world[index]) for child in reversed(nodes[index].get("children", []))]
+    return world
 
 
-def left_out(tree: dict[str, Any]) -> dict[str, int]:
-    """What a still mesh can't say: how many animations, skins, morph targets, cameras and lights the file holds."""
-    primitives = [primitive for mesh in tree.get("meshes", []) for primitive in mesh["primitives"]]
-    return {
-        "skipped_animations": len(tree.get("animations", [])),
-        "skipped_skins": len(tree.get("skins", [])),
-        "skipped_morph_targets": sum(len(primitive.get("targets", [])) for primitive in primitives),
-        "skipped_cameras": len(tree.get("cameras", [])),
-        "skipped_lights": len(tree.get("extensions", {}).get(LIGHTS, {}).get("lights", [])),
-    }
+def _standing(file: GltfFile, index: int, world: Mapping[int, NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """The matrices of the mesh of a node: one, or one for each instance."""
+    node = file.tree["nodes"][index]
+    if "skin" not in node:
+        return [world[index] @ own for own in _instances(file, node)]
+    skin = file.tree["skins"][node["skin"]]
+    joint = world.get(skin["joints"][0], np.eye(4))
+    if "inverseBindMatrices" not in skin:
+        return [joint]
+    return [joint @ read_accessor(file, skin["inverseBindMatrices"])[0].reshape(4, 4).T]
 
 
 def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""glTF 2.0 (.glb, .gltf) → RawMesh: the triangles of the default scene, node transforms applied, in scene order.
+"""glTF 2.0 (.glb, .gltf) → RawMesh: the triangles of its meshes, node transforms applied, in scene order.
 
 Words of the specification (Khronos, glTF 2.0.1): accessor, primitive, node.  uv is turned v up; linear COLOR_0 becomes
 sRGB.  Read here and not with trimesh, which drops uv without a material, ignores `normalized` and trusts any count.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from ..polygons import strip_triangles
 from ..rawmesh import MAX_FACES, RawMesh, merge, transformed
 from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor, read_buffers
 from .compression import DRACO, decode_draco
+from .document import Document, Part
 from .materials import read_materials, uv_set
-from .nodes import left_out, placed_meshes
+from .nodes import best_placements, placed_meshes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,12 +34,13 @@ if TYPE_CHECKING:
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_gltf(data: bytes, folder: Path) -> RawMesh:
-    """Read a .glb or .gltf file.
+def read_gltf(data: bytes, folder: Path, *, instances: bool = False) -> RawMesh:
+    """Read a .glb or .gltf file: each mesh once, where it stands best for unwrapping, with the document beside it.
 
     Args:
         data: the bytes of the file.
         folder: where it lies; references outside of it, and URLs, are refused.
+        instances: each mesh wherever it stands in the default scene instead, as triangles without a document.
 
     Raises:
         MeshError: damaged, of an extension that must be known and is not, without triangles, or with such a reference.
@@ -46,7 +49,7 @@ def read_gltf(data: bytes, folder: Path) -> RawMesh:
     try:
         tree, binary = parse_tree(data)
         file = GltfFile(tree, read_buffers(tree, binary, folder), folder)
-        return _scene(file)
+        return _scene(file, instances=instances)
     except FlexparaError:
         raise
     except (
@@ -73,24 +76,32 @@ def _what(error: Exception) -> str:
     return "a value has the wrong type or size"
 
 
-def _scene(file: GltfFile) -> RawMesh:
+def _scene(file: GltfFile, *, instances: bool) -> RawMesh:
     materials, changes = read_materials(file)
-    parts, skipped, faces = [], 0, 0
-    for mesh, world in placed_meshes(file):
-        for primitive in file.tree["meshes"][mesh]["primitives"]:
+    placements = placed_meshes(file)
+    chosen = [entry for entry in placements if entry.first] if instances else best_placements(placements)
+    found, parts, skipped, rows, faces = [], [], 0, 0, 0
+    for placement in chosen:
+        for number, primitive in enumerate(file.tree["meshes"][placement.mesh]["primitives"]):
             if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
                 skipped += 1
                 continue
-            parts.append(transformed(_primitive(file, primitive, materials), world))
-            faces += len(parts[-1].faces)
+            raw = _primitive(file, primitive, materials)
+            count = len(raw.positions)
+            body = np.full(count, placement.mesh, dtype=np.int64)
+            raw = replace(raw, origin=rows + np.arange(count), body=None if instances else body)
+            found.append(transformed(raw, placement.world))
+            parts.append(Part(placement.mesh, number, rows, count, placement.world))
+            rows, faces = rows + count, faces + len(raw.faces)
             if faces > MAX_FACES:
                 raise MeshError(f"the glTF scene has over {MAX_FACES} faces; decimate the meshes or split the scene")
-    if not parts:
-        found = "points or lines only (give points as .ply, .xyz or .npy)" if skipped else "no mesh"
-        raise MeshError(f"the glTF scene holds {found}, expected triangles; check the export")
-    whole = merge(parts)
-    whole.changes.update(changes, skipped_primitives=skipped, **left_out(file.tree))
-    return whole
+    if not found:
+        what = "points or lines only (give points as .ply, .xyz or .npy)" if skipped else "no mesh"
+        raise MeshError(f"the glTF scene holds {what}, expected triangles; check the export")
+    whole = merge(found)  # what it counts is nothing that the document loses
+    if instances:
+        return replace(whole, changes={**whole.changes, **changes, "skipped_primitives": skipped})
+    return replace(whole, document=Document(file, tuple(parts), tuple(placements)), changes=changes)
 
 
 def _primitive(file: GltfFile, primitive: dict[str, Any], materials: Sequence[Material]) -> RawMesh:

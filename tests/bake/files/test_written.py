@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.files.usd import write_usda
-from flexpara.bake.files.written import corner_uv_of, written_report
+from flexpara.bake.files.written import Reading, corner_uv_of, written_report
 from flexpara.bake.output import written_notes
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
@@ -127,12 +127,12 @@ def test_overlaps_are_found(pair: Callable[..., Pair], tmp_path: Path) -> None:
     report = written_report(written(twice, tmp_path), twice[0].uv[twice[0].faces])
     assert {found["overlapping"] for found in report.values()} == {1}
     paths = {kind: tmp_path / f"mesh.{kind}" for kind in FORMATS}
-    believed = written_report(paths, twice[0].uv[twice[0].faces], apart=True)
+    believed = written_report(paths, twice[0].uv[twice[0].faces], Reading(apart=True))
     assert {found["overlapping"] for found in believed.values()} == {0}
 
 
 def test_large_meshes_are_judged_by_what_was_serialized(quad: Pair, tmp_path: Path) -> None:
-    report = written_report(written(quad, tmp_path), quad[0].uv[quad[0].faces], read_back=1)
+    report = written_report(written(quad, tmp_path), quad[0].uv[quad[0].faces], Reading(most=1))
     assert {found["read_back"] for found in report.values()} == {False}
 
 
@@ -141,5 +141,5 @@ def test_a_file_cut_short_is_named(quad: Pair, tmp_path: Path) -> None:
         path.write_bytes(path.read_bytes()[:120])
         with pytest.raises(MeshError, match=f"mesh{path.suffix} holds no triangles with uv"):
             corner_uv_of(path)
-    with pytest.raises(MeshError, match=r"mesh\.stl: expected one of \.glb, \.obj, \.ply, \.usda"):
+    with pytest.raises(MeshError, match=r"mesh\.stl: expected one of \.glb, \.gltf, \.obj, \.ply, \.usda"):
         corner_uv_of(tmp_path / "mesh.stl")

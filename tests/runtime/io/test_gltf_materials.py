@@ -79,10 +79,12 @@ def test_factors_are_linear_and_limited() -> None:
 def test_a_texture_without_a_picture_is_counted() -> None:
     (material,), changes = read(TEXTURES, textures=[{}, {"source": 1}])
     assert set(material.pictures) == {"metallic-roughness", "emissive"}
-    assert changes["missing_textures"] == 3
+    assert changes["textures_not_decoded"] == 3
+    assert set(material.unread) == {"base-color", "normal", "occlusion"}
+    assert material.unread["normal"] == "has its picture in no extension, which is not read"
 
 
-def test_a_texture_on_another_uv_set_is_left_out_and_counted() -> None:
+def test_a_texture_on_another_uv_set_is_not_baked_and_counted() -> None:
     entry = {**TEXTURES, "occlusionTexture": {"index": 0, "texCoord": 1}}
     (material,), changes = read(entry)
     assert "occlusion" not in material.pictures

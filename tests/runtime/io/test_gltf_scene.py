@@ -145,7 +145,7 @@ def test_nodes_are_placed_depth_first_in_scene_order(tmp_path: Path) -> None:
     )
     maker.tree["scenes"] = [{"nodes": [1]}, {"nodes": [0, 1]}]
     maker.tree["scene"] = 1
-    raw = read_gltf(maker.glb(), tmp_path)
+    raw = read_gltf(maker.glb(), tmp_path, instances=True)
     np.testing.assert_allclose(raw.positions[:3], TRIANGLE + np.array([10, 0, 0]))
     np.testing.assert_allclose(raw.positions[3:6], [[10, 1, 0], [10, 4, 0], [9, 1, 0]], atol=1e-7)
     np.testing.assert_allclose(raw.positions[6:], 2 * TRIANGLE + np.array([0, 0, 5]))

@@ -1,0 +1,67 @@
+"""A glTF document beside the surface that is read of it: which row of which primitive each vertex of the mesh is.
+
+Rows number the vertices of all parts, one part after the other; a part is one primitive of triangles.  Words of the
+specification (Khronos, glTF 2.0.1): mesh, primitive, node, accessor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .buffers import GltfFile
+    from .nodes import Placement
+
+TRIANGLES = 4
+LIGHTS = "KHR_lights_punctual"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One primitive.
+
+    mesh, primitive: its numbers.  start, count: its rows.  world: (4, 4) float64, its own space → that of the asset.
+    """
+
+    mesh: int
+    primitive: int
+    start: int
+    count: int
+    world: NDArray[np.float64]
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether its triangles wind the other way in the asset than in the file."""
+        return bool(np.linalg.det(self.world[:3, :3]) < 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """The file, the parts of the asset, and every place where a mesh stands in the default scene."""
+
+    file: GltfFile
+    parts: tuple[Part, ...]
+    placements: tuple[Placement, ...]
+
+    def part_of(self, row: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Part of each row (m,) int64."""
+        return np.searchsorted([part.start for part in self.parts], row, side="right") - 1
+
+    def beyond_meshes(self) -> dict[str, int]:
+        """What a still mesh can't say: instances, animations, skins, morph targets, cameras and lights of the file."""
+        tree: dict[str, Any] = self.file.tree
+        primitives = [primitive for mesh in tree.get("meshes", []) for primitive in mesh["primitives"]]
+        counts = {
+            "skipped_animations": len(tree.get("animations", [])),
+            "skipped_skins": len(tree.get("skins", [])),
+            "skipped_morph_targets": sum(len(primitive.get("targets", [])) for primitive in primitives),
+            "skipped_cameras": len(tree.get("cameras", [])),
+            "skipped_lights": len(tree.get("extensions", {}).get(LIGHTS, {}).get("lights", [])),
+            "skipped_primitives": sum(primitive.get("mode", TRIANGLES) < TRIANGLES for primitive in primitives),
+        }
+        return {name: count for name, count in counts.items() if count}

@@ -1,0 +1,78 @@
+"""Scenes on the command line: nothing is lost in silence."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from flexpara.__main__ import main
+from flexpara.runtime.io.meshfile import load_asset
+
+QUICK = ["--size", "64", "--maps", "none", "--no-preview"]
+
+
+def _helper(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.glb"
+    path.write_bytes(_helper("scenefile").whole_scene().glb())
+    return path
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_a_scene_in_gltf_loses_nothing_and_says_nothing(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["unwrap", str(scene), "-o", str(tmp_path / "out"), *QUICK, "--strict"]) == 0
+    assert "left out" not in capsys.readouterr().err
+    report = json.loads((tmp_path / "out" / "scene.report.json").read_text(encoding="utf-8"))
+    assert not [name for name in report["changes"] if name.startswith("skipped_")]
+    assert report["written"]["glb"] == {"faces": 14, "flipped": 0, "overlapping": 0, "read_back": True}
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_what_obj_cannot_hold_is_said_line_by_line(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), *QUICK, "--format", "obj"]
+    assert main(argv) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "note" in line]
+    said = ("1 animation left out", "1 skin left out", "1 morph target left out", "1 camera", "1 light")
+    assert all(any(fact in line for line in lines) for fact in said)
+    report = json.loads((tmp_path / "out" / "scene.report.json").read_text(encoding="utf-8"))
+    assert report["changes"]["skipped_animations"] == 1
+    assert report["written"]["obj"]["faces"] == 14
+    assert len(load_asset(tmp_path / "out" / "scene.obj").faces) == 3 * 8 + 6
+    assert main([*argv, "--strict"]) == 2
+    assert "1 animation left out" in capsys.readouterr().err
+
+
+def test_a_texture_that_cannot_be_decoded_is_refused_or_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], instant_training: list[object]
+) -> None:
+    made = _helper("scenefile").whole_scene()
+    made.tree["textures"][0] = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
+    made.tree["images"][0]["mimeType"] = "image/ktx2"
+    path = tmp_path / "scene.glb"
+    path.write_bytes(made.glb())
+    assert main(["unwrap", str(path), "-o", str(tmp_path / "out"), "--size", "64"]) == 2
+    assert "the base-color texture of material Paint" in capsys.readouterr().err
+    assert instant_training == []
+    assert main(["unwrap", str(path), "-o", str(tmp_path / "out"), *QUICK]) == 0
+    data = (tmp_path / "out" / "scene.glb").read_bytes()
+    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    assert tree["textures"][0] == made.tree["textures"][0]
+    assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0, "texCoord": 1}
+    assert len(load_asset(path).faces) == len(load_asset(tmp_path / "out" / "scene.glb").faces)
