@@ -22,7 +22,7 @@ from ..runtime.sessions.session import UnwrapSession
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.search.recut import recut
-from .metadata import Provenance
+from .metadata import PlacedCharts, Provenance
 from .onnxfile import export_networks
 
 if TYPE_CHECKING:
@@ -77,9 +77,9 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
         "train": trained.report,
     }
     with clock.stage("export"), TemporaryDirectory() as folder:
-        path = Path(folder) / "atlas.onnx"
+        path, placed = Path(folder) / "atlas.onnx", PlacedCharts(trained.frame, atlas, trained.charts)
         facts = Provenance(asset.sha256, report["settings"], report["metrics"])
-        parity = export_networks(trained.networks, trained.frame, atlas, trained.charts, path, metadata=facts)
+        parity = export_networks(trained.networks, placed, path, metadata=facts)
         network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
         paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, size, facts)
@@ -132,7 +132,7 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
     with clock.stage("export inverse"), TemporaryDirectory() as folder:
         path = Path(folder) / "atlas.wrap.onnx"
         facts = Provenance(asset.sha256, found.report["settings"], found.report["metrics"])
-        export_wrap(model, found.frame, found.atlas, found.charts, path, metadata=facts)
+        export_wrap(model, PlacedCharts(found.frame, found.atlas, found.charts), path, metadata=facts)
         agreed = inverse_agreement(WrapSession(path), asset.surface, found.atlas)
         return path.read_bytes(), agreed.to_dict()
 

@@ -26,6 +26,21 @@ Ends = dict[str, tuple[str, list[str | int]]]
 ELEMENT_TYPES = {"float32": TensorProto.FLOAT, "int64": TensorProto.INT64}
 
 
+@dataclass(frozen=True)
+class Header:
+    """What a file says besides its graph.
+
+    opset: operator set of the default domain.  ir_version: of ONNX.  producer: name and version.  metadata: key → text,
+    stored as metadata_props.  name: of the graph.
+    """
+
+    opset: int
+    ir_version: int
+    producer: tuple[str, str]
+    metadata: dict[str, str]
+    name: str = "unwrap"
+
+
 @dataclass
 class GraphBuilder:
     """Collects nodes and initializers; equal constants are stored once."""
@@ -63,27 +78,8 @@ class GraphBuilder:
         self.nodes.append(node)
         return parts
 
-    def serialize(
-        self,
-        inputs: Ends,
-        outputs: Ends,
-        *,
-        opset: int,
-        ir_version: int,
-        producer: tuple[str, str],
-        metadata: dict[str, str],
-        name: str = "unwrap",
-    ) -> bytes:
+    def serialize(self, inputs: Ends, outputs: Ends, header: Header) -> bytes:
         """The finished model, checked by onnx with full shape inference.
-
-        Args:
-            inputs: see Ends.
-            outputs: likewise.
-            opset: operator set of the default domain.
-            ir_version: ONNX IR version.
-            producer: name and version.
-            metadata: key → text, stored as metadata_props.
-            name: of the graph.
 
         Raises:
             FlexparaError: the nodes don't fit together.
@@ -92,10 +88,11 @@ class GraphBuilder:
         def ends(side: Ends) -> list[ValueInfoProto]:
             return [helper.make_tensor_value_info(name, ELEMENT_TYPES[t], shape) for name, (t, shape) in side.items()]
 
-        graph = helper.make_graph(self.nodes, name, ends(inputs), ends(outputs), self.initializers)
-        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=ir_version)
-        model.producer_name, model.producer_version = producer
-        helper.set_model_props(model, metadata)
+        graph = helper.make_graph(self.nodes, header.name, ends(inputs), ends(outputs), self.initializers)
+        opset = helper.make_opsetid("", header.opset)
+        model = helper.make_model(graph, opset_imports=[opset], ir_version=header.ir_version)
+        model.producer_name, model.producer_version = header.producer
+        helper.set_model_props(model, header.metadata)
         try:
             checker.check_model(model, full_check=True)
         except (checker.ValidationError, shape_inference.InferenceError) as error:

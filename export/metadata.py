@@ -37,16 +37,30 @@ class Provenance:
     metrics: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
-def bundle_metadata(frame: Frame, atlas: Atlas, charts: Charts, provenance: Provenance) -> BundleMetadata:
+@dataclass(frozen=True, eq=False)
+class PlacedCharts:
+    """Finished charts between the surface and the atlas: all geometry that a file folds in.
+
+    frame: source units → unit ball.  atlas: of pack(); its placement must be set, its positions or uv serve as probes.
+    charts: those of the atlas.
+    """
+
+    frame: Frame
+    atlas: Atlas
+    charts: Charts
+
+
+def bundle_metadata(placed: PlacedCharts, provenance: Provenance) -> BundleMetadata:
     """Metadata of one export.
 
     Raises:
         InputError: the atlas has no placement, or frame or placement are not finite.
         ShapeError: placement is not (k, 2, 3), or patch_chart names a chart that it does not place.
     """
+    frame, atlas = placed.frame, placed.atlas
     placement = _checked_placement(atlas)
     count = len(placement)
-    patches = charts.patch_chart
+    patches = placed.charts.patch_chart
     if patches.ndim != 1 or len(patches) == 0 or patches.min() < 0 or patches.max() >= count:
         found = f"patch_chart of shape {patches.shape} with values {np.unique(patches)[:8].tolist()}"
         raise ShapeError(f"{found}, expected (p,) indices in [0, {count}); pack these charts and pass that atlas")

@@ -14,7 +14,7 @@ import numpy as np
 from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
 from .frames import fold_frame, unit_ball
-from .metadata import Provenance, bundle_metadata
+from .metadata import PlacedCharts, Provenance, bundle_metadata
 from .onnxgraph import write_gated
 from .parity import ParityReport, ParitySpec, Truth, probe_points, prove_parity
 from .proven import POINT_MAP, FileKind, check_folder, write_proven
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
     from ..train.deploy.gated import GatedExperts
 
@@ -42,9 +41,7 @@ class NetworkSpec:
 
 def export_networks(
     networks: GatedExperts,
-    frame: Frame,
-    atlas: Atlas,
-    charts: Charts,
+    placed: PlacedCharts,
     path: Path,
     *,
     metadata: Provenance | None = None,
@@ -52,13 +49,11 @@ def export_networks(
 ) -> ParityReport:
     """Write an ONNX file and prove that it equals the networks, or raise and leave nothing behind.
 
-    Same networks, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
+    Same networks, placed charts and metadata → same bytes.  The file appears whole or not at all.
 
     Args:
         networks: unit ball (n, 3) → chart coordinates, chart, score.
-        frame: source units → unit ball.
-        atlas: of pack(); its placement must be set, its positions serve as probes.
-        charts: face_chart is used.
+        placed: charts, frame and atlas.
         path: of the file; its folder exists.
         metadata: source hash, settings, metrics.
         spec: None = NetworkSpec().
@@ -70,11 +65,12 @@ def export_networks(
     """
     spec = spec or NetworkSpec()
     check_folder(path)
-    facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
-    placed = place(networks, facts)
-    content = build_networks(placed, facts, spec.kind)
-    points = probe_points(atlas, frame, charts.face_chart, max(spec.parity.sizes), spec.parity.seed)
-    model = NetworkTruth(placed, facts, spec.parity.tie)
+    facts = bundle_metadata(placed, metadata or Provenance())
+    networks = place(networks, facts)
+    content = build_networks(networks, facts, spec.kind)
+    owner, most = placed.charts.face_chart, max(spec.parity.sizes)
+    points = probe_points(placed.atlas, placed.frame, owner, most, spec.parity.seed)
+    model = NetworkTruth(networks, facts, spec.parity.tie)
     return write_proven(path, content, lambda content: prove_parity(model, content, points, spec.parity))
 
 

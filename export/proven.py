@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 from ..runtime.errors import MissingFileError
 from ..runtime.files import replace_file
 from ..runtime.sessions.bundle import METADATA_KEY
+from .builder import Header
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,15 +48,9 @@ class FileKind:
             text: the JSON attached to the file.
             name: of the graph.
         """
-        return builder.serialize(
-            inputs,
-            outputs,
-            opset=self.opset,
-            ir_version=self.ir_version,
-            producer=(metadata.producer_name, metadata.producer_version),
-            metadata={METADATA_KEY: text},
-            name=name,
-        )
+        producer = metadata.producer_name, metadata.producer_version
+        header = Header(self.opset, self.ir_version, producer, {METADATA_KEY: text}, name)
+        return builder.serialize(inputs, outputs, header)
 
 
 def check_folder(path: Path) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 
 from ..runtime.mesh import Atlas, Charts
+from .metadata import PlacedCharts
 from .torchfile import export_onnx
 from .torchmodel import frozen_copy
 
@@ -44,7 +45,7 @@ def raw_onnx(model: nn.Module, surface: Surface, frame: Frame, size: int, facts:
     atlas = raw_atlas(surface, charts, size)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "paper.onnx"
-        export_onnx(model, frame, atlas, charts, path, metadata=facts)
+        export_onnx(model, PlacedCharts(frame, atlas, charts), path, metadata=facts)
         return path.read_bytes()
 
 

@@ -20,7 +20,7 @@ from ..runtime.errors import ShapeError
 from .builder import GraphBuilder
 from .frames import unit_ball
 from .lowering import Lowering, Value, cut_to_patch, is_per_patch, trace
-from .metadata import Provenance, bundle_metadata
+from .metadata import PlacedCharts, Provenance, bundle_metadata
 from .parity import ParityReport, ParitySpec, probe_points, prove_parity
 from .proven import POINT_MAP, FileKind, check_folder, write_proven
 from .torchmodel import UnwrapGraph, chart_membership, frozen_copy, truth_of
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from torch import fx, nn
 
-    from ..runtime.mesh import Atlas, Charts, Frame
     from ..runtime.sessions.bundle import BundleMetadata
 
 
@@ -48,9 +47,7 @@ class ExportSpec:
 
 def export_onnx(
     model: nn.Module,
-    frame: Frame,
-    atlas: Atlas,
-    charts: Charts,
+    placed: PlacedCharts,
     path: Path,
     *,
     metadata: Provenance | None = None,
@@ -58,13 +55,11 @@ def export_onnx(
 ) -> ParityReport:
     """Write an ONNX file and prove it equals the torch model, or raise and leave nothing behind.
 
-    Same model, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
+    Same model, placed charts and metadata → same bytes.  The file appears whole or not at all.
 
     Args:
-        model: see torchmodel.PatchNetworks; p = len(charts.patch_chart).  Neither moved nor changed.
-        frame: source units → unit ball.
-        atlas: of pack(); its placement must be set, its positions serve as probes.
-        charts: patch_chart and face_patch are used.
+        model: see torchmodel.PatchNetworks; p = len(patch_chart) of the charts.  Neither moved nor changed.
+        placed: charts, frame and atlas.
         path: of the file; its folder exists.
         metadata: source hash, settings, metrics.
         spec: None = ExportSpec().
@@ -77,9 +72,10 @@ def export_onnx(
     """
     spec = spec or ExportSpec()
     check_folder(path)
-    facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
+    facts = bundle_metadata(placed, metadata or Provenance())
     content = build_model(model, facts, spec)
-    points = probe_points(atlas, frame, charts.face_patch, max(spec.parity.sizes), spec.parity.seed)
+    owner, most = placed.charts.face_patch, max(spec.parity.sizes)
+    points = probe_points(placed.atlas, placed.frame, owner, most, spec.parity.seed)
     truth = truth_of(UnwrapGraph(frozen_copy(model), facts), spec.parity.tie)
     return write_proven(path, content, lambda content: prove_parity(truth, content, points, spec.parity))
 

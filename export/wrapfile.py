@@ -18,7 +18,7 @@ from ..runtime.sessions.wrapsession import wrap_json
 from ..train.deploy.fit_wrap import HEIGHT, on_layers
 from .builder import Ends, GraphBuilder
 from .frames import fold_frame
-from .metadata import Provenance, bundle_metadata
+from .metadata import PlacedCharts, Provenance, bundle_metadata
 from .onnxgraph import write_gated
 from .parity import largest_difference, load_model, run_model
 from .proven import FileKind, check_folder, write_proven
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..runtime.mesh import Atlas, Charts, Frame
+    from ..runtime.mesh import Atlas
     from ..runtime.sessions.bundle import BundleMetadata
     from ..train.deploy.gated import GatedExperts
 
@@ -108,9 +108,7 @@ class Inverse:
 
 def export_wrap(
     networks: GatedExperts,
-    frame: Frame,
-    atlas: Atlas,
-    charts: Charts,
+    placed: PlacedCharts,
     path: Path,
     *,
     metadata: Provenance | None = None,
@@ -118,13 +116,11 @@ def export_wrap(
 ) -> WrapParityReport:
     """Write the inverse and prove that it equals the networks, or raise and leave nothing behind.
 
-    Same networks, frame, atlas, charts and metadata → same bytes.  The file appears whole or not at all.
+    Same networks, placed charts and metadata → same bytes.  The file appears whole or not at all.
 
     Args:
         networks: of fit_wrap().
-        frame: source units → unit ball.
-        atlas: of pack(); its placement must be set, its uv serve as probes.
-        charts: those of the atlas.
+        placed: charts, frame and atlas.
         path: of the file; its folder exists.
         metadata: source hash, settings, metrics.
         spec: None = WrapSpec().
@@ -139,10 +135,10 @@ def export_wrap(
     if networks.weights.shape[1:] != (6, 4):
         found = f"weights of shape {networks.weights.shape}"
         raise ShapeError(f"{found}, expected (e, 6, 4): uv to position and normal; pass what fit_wrap gave")
-    facts = bundle_metadata(frame, atlas, charts, metadata or Provenance())
+    facts = bundle_metadata(placed, metadata or Provenance())
     inverse = Inverse(networks, facts)
     content = build_inverse(inverse, spec.kind)
-    probes = probe_uv(atlas, max(spec.parity.sizes), spec.parity.seed)
+    probes = probe_uv(placed.atlas, max(spec.parity.sizes), spec.parity.seed)
     return write_proven(path, content, lambda content: prove_inverse(inverse, content, probes, spec.parity))
 
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from flexpara.export.metadata import Provenance, bundle_metadata
+from flexpara.export.metadata import PlacedCharts, Provenance, bundle_metadata
 from flexpara.export.parity import probe_points
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.bundle import BundleMetadata
@@ -56,7 +56,7 @@ class Map:
 
     @property
     def metadata(self) -> BundleMetadata:
-        return bundle_metadata(self.frame, self.atlas, self.charts, Provenance())
+        return bundle_metadata(PlacedCharts(self.frame, self.atlas, self.charts), Provenance())
 
 
 def sphere_points(count: int, centre: tuple[float, float, float], radius: float) -> np.ndarray:

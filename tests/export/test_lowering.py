@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from flexpara.export.builder import GraphBuilder
+from flexpara.export.builder import GraphBuilder, Header
 from flexpara.export.lowering import Lowering, Value, cut_to_patch, trace
 from flexpara.runtime.errors import FlexparaError
 
@@ -41,10 +41,7 @@ def lowered(model: nn.Module, points: np.ndarray, *, cut: Callable[[Tensor], Ten
     content = builder.serialize(
         {"points": ("float32", ["n", 3])},
         {"out": ("float32", [f"axis_{axis}" for axis in range(value.rank)])},
-        opset=18,
-        ir_version=8,
-        producer=("test", "0"),
-        metadata={},
+        Header(18, 8, ("test", "0"), {}),
     )
     session = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
     return np.asarray(session.run(["out"], {"points": points})[0])

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import numpy_helper
 
-from flexpara.export.metadata import Provenance, bundle_metadata
+from flexpara.export.metadata import PlacedCharts, Provenance, bundle_metadata
 from flexpara.export.onnxfile import NetworkSpec, NetworkTruth, build_networks, export_networks, place
 from flexpara.export.parity import ParityReport, ParitySpec, prove_parity
 from flexpara.export.proven import FileKind
@@ -52,7 +52,7 @@ def make_networks(make_map: MapMaker) -> MapMaker:
 
 
 def export(made: Any, path: Path, **options: Any) -> ParityReport:
-    return export_networks(made.model, made.frame, made.atlas, made.charts, path, **options)
+    return export_networks(made.model, PlacedCharts(made.frame, made.atlas, made.charts), path, **options)
 
 
 def run(path: Path, points: NDArray[np.float32]) -> list[NDArray[Any]]:
@@ -211,5 +211,5 @@ import flexpara.train.deploy.config
 def test_bundle_metadata_is_what_the_session_reads(make_networks: MapMaker, tmp_path: Path) -> None:
     made = make_networks()
     export(made, tmp_path / "a.onnx")
-    written = bundle_metadata(made.frame, made.atlas, made.charts, Provenance())
+    written = bundle_metadata(PlacedCharts(made.frame, made.atlas, made.charts), Provenance())
     assert UnwrapSession(tmp_path / "a.onnx").metadata == written

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from flexpara.export.metadata import PlacedCharts
 from flexpara.export.onnxfile import export_networks
 from flexpara.export.wrapfile import export_wrap
 from flexpara.runtime.io.meshfile import asset_from_arrays
@@ -82,9 +83,10 @@ def both_ways(asset: Asset, charts: Charts, folder: Path) -> tuple[UnwrapSession
     def silence(*_: Any, **__: Any) -> None:
         """Progress that nobody watches."""
 
-    export_networks(fit_networks(ball, charts, FitConfig(), 0, silence), frame, atlas, charts, folder / "a.onnx")
+    placed = PlacedCharts(frame, atlas, charts)
+    export_networks(fit_networks(ball, charts, FitConfig(), 0, silence), placed, folder / "a.onnx")
     inverse = fit_wrap(ball, charts, atlas.corner_uv, progress=silence)
-    export_wrap(inverse, frame, atlas, charts, folder / "a.wrap.onnx")
+    export_wrap(inverse, placed, folder / "a.wrap.onnx")
     return UnwrapSession(folder / "a.onnx"), WrapSession(folder / "a.wrap.onnx"), atlas, frame
 
 

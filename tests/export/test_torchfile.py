@@ -15,7 +15,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from flexpara.export.metadata import Provenance
+from flexpara.export.metadata import PlacedCharts, Provenance
 from flexpara.export.parity import ParitySpec
 from flexpara.export.torchfile import ExportSpec, export_onnx
 from flexpara.export.torchmodel import UnwrapGraph
@@ -27,7 +27,7 @@ DENSE = ExportSpec(routed=False)
 
 
 def export(made: Any, path: Path, **options: Any) -> Any:
-    return export_onnx(made.model, made.frame, made.atlas, made.charts, path, **options)
+    return export_onnx(made.model, PlacedCharts(made.frame, made.atlas, made.charts), path, **options)
 
 
 def run(path: Path, points: np.ndarray) -> list[np.ndarray]:

@@ -14,7 +14,7 @@ import onnxruntime
 import pytest
 from numpy.typing import NDArray
 
-from flexpara.export.metadata import Provenance
+from flexpara.export.metadata import PlacedCharts, Provenance
 from flexpara.export.proven import FileKind
 from flexpara.export.wrapfile import (
     Inverse,
@@ -61,7 +61,7 @@ def make_inverse(make_map: MapMaker) -> MapMaker:
 
 
 def export(made: Any, path: Path, **options: Any) -> Any:
-    return export_wrap(made.model, made.frame, made.atlas, made.charts, path, **options)
+    return export_wrap(made.model, PlacedCharts(made.frame, made.atlas, made.charts), path, **options)
 
 
 def run(path: Path, uv: NDArray[np.float32], chart: NDArray[np.int64]) -> list[NDArray[Any]]:

@@ -13,7 +13,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from flexpara.export.builder import GraphBuilder
+from flexpara.export.builder import GraphBuilder, Header
 from flexpara.runtime.errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
@@ -59,10 +59,7 @@ def closed_form(metadata: dict[str, str], outputs: Any = None, *, points: str = 
     return builder.serialize(
         {points: ("float32", ["n", 3])},
         outputs or OUTPUTS,
-        opset=18,
-        ir_version=8,
-        producer=("a test", "0"),
-        metadata=metadata,
+        Header(18, 8, ("a test", "0"), metadata),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexpara.export.builder import Ends, GraphBuilder
+from flexpara.export.builder import Ends, GraphBuilder, Header
 from flexpara.runtime.errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata
@@ -51,10 +51,7 @@ def closed_form(metadata: dict[str, str], outputs: Ends | None = None, *, uv: st
     return builder.serialize(
         {uv: ("float32", ["n", 2]), "chart": ("int64", ["n"])},
         outputs or OUTPUTS,
-        opset=18,
-        ir_version=8,
-        producer=("a test", "0"),
-        metadata=metadata,
+        Header(18, 8, ("a test", "0"), metadata),
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from flexpara.export.metadata import PlacedCharts
 from flexpara.export.torchfile import export_onnx
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.session import UnwrapSession
@@ -42,7 +43,7 @@ def test_the_papers_networks_are_exported_and_answer_alike(charts: int, tmp_path
     if charts > 1:
         networks = MultiChartPaperNetworks(charts, NETS, generator=generator)
     frame, atlas, shape = placed(charts)
-    report = export_onnx(networks, frame, atlas, shape, tmp_path / "map.onnx")
+    report = export_onnx(networks, PlacedCharts(frame, atlas, shape), tmp_path / "map.onnx")
     assert report is not None
     uv, chart, score = UnwrapSession(tmp_path / "map.onnx").unwrap(atlas.positions)
     with torch.no_grad():
