@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ...runtime.errors import InputError
 from ..bakemap import NORMAL_FORMATS, BakeMap, NormalFormat
@@ -15,6 +16,9 @@ from .normals import FLAT, object_normal_map, tangent_normal_map
 from .occlusion import ao_map, bent_normal_map, bent_normal_object_map, thickness_map
 from .rays import RaySettings
 from .surface import position_map
+
+if TYPE_CHECKING:
+    from ..bakemap import Compute
 
 HEIGHT = "height"
 """The one map that is measured between two meshes: see highpoly/highmaps.py."""
@@ -30,48 +34,51 @@ def all_maps(normal_format: NormalFormat = "opengl", rays: RaySettings | None = 
     """
     if normal_format not in NORMAL_FORMATS:
         raise InputError(f"normal format {normal_format!r}: expected one of {', '.join(NORMAL_FORMATS)}")
-    up = "tangent, Y up" if normal_format == "opengl" else "tangent, Y down"
-    tangent = tangent_normal_map(normal_format)
-    color, part, unit = "linear light", "share", "unit vector"
     rays = rays or RaySettings()
-    bent, bent_object = bent_normal_map(rays, normal_format), bent_normal_object_map(rays)
-    noisy: dict[str, Any] = {"estimated": True}
+    tangent, bent = tangent_normal_map(normal_format), bent_normal_map(rays, normal_format)
     maps = (
-        BakeMap("normal", up, "unit vector", RANGE_11, "signed", "png", 8, tangent, FLAT, dither=True),
-        BakeMap("normal-object", "object", "unit vector", RANGE_11, "signed", "exr", 16, object_normal_map(), BLACK),
+        in_tangent_space("normal", tangent, normal_format),
+        in_object_space("normal-object", object_normal_map()),
         BakeMap("position", "object", "source units", "any", "linear", "exr", 32, position_map, BLACK),
-        BakeMap("chart", "none", color, RANGE_01, "srgb", "png", 8, chart_map, BLACK),
-        BakeMap("uv-checker", "uv", color, RANGE_01, "srgb", "png", 8, uv_checker_map, BLACK, everywhere=True),
-        BakeMap("vertex-color", "none", color, RANGE_01, "srgb", "png", 8, vertex_color_map, BLACK),
-        BakeMap("base-color", "none", color, RANGE_01, "srgb", "png", 8, opaque_color_map(), BLACK),
-        BakeMap("metallic-roughness", "none", part, RANGE_01, "unit", "png", 8, metallic_roughness_map(), (1, 1, 0)),
-        BakeMap("occlusion", "none", part, RANGE_01, "unit", "png", 8, occlusion_map(), WHITE),
-        BakeMap("orm", "none", part, RANGE_01, "unit", "png", 8, orm_map(), (1, 1, 0)),
-        BakeMap("emissive", "none", color, RANGE_01, "srgb", "png", 8, emissive_map(), BLACK),
+        colored("chart", chart_map),
+        replace(colored("uv-checker", uv_checker_map), space="uv", everywhere=True),
+        colored("vertex-color", vertex_color_map),
+        colored("base-color", opaque_color_map()),
+        share("metallic-roughness", metallic_roughness_map(), (1, 1, 0)),
+        share("occlusion", occlusion_map(), WHITE),
+        share("orm", orm_map(), (1, 1, 0)),
+        colored("emissive", emissive_map()),
         BakeMap("face-id", "none", "face number", "whole", "linear", "exr", 32, face_id_map, (-1, -1, -1)),
-        BakeMap("material-id", "none", color, RANGE_01, "srgb", "png", 8, material_id_map, BLACK),
-        BakeMap("ao", "none", part, RANGE_01, "unit", "png", 8, ao_map(rays), WHITE, dither=True, **noisy),
-        BakeMap("bent-normal", up, unit, RANGE_11, "signed", "png", 8, bent, FLAT, dither=True, **noisy),
-        BakeMap(
-            "bent-normal-object", "object", unit, RANGE_11, "signed", "exr", 16, bent_object, BLACK, estimated=True
-        ),
-        BakeMap(
-            "thickness",
-            "none",
-            "radii",
-            RANGE_01,
-            "unit",
-            "png",
-            8,
-            thickness_map(rays),
-            BLACK,
-            dither=True,
-            estimated=True,
-        ),
-        BakeMap("curvature", "none", "shaped", RANGE_01, "unit", "png", 8, curvature_map(), GREY, dither=True),
-        BakeMap("distortion", "none", color, RANGE_01, "srgb", "png", 8, distortion_map(), BLACK),
+        colored("material-id", material_id_map),
+        replace(share("ao", ao_map(rays), WHITE), dither=True, estimated=True),
+        replace(in_tangent_space("bent-normal", bent, normal_format), estimated=True),
+        replace(in_object_space("bent-normal-object", bent_normal_object_map(rays)), estimated=True),
+        replace(share("thickness", thickness_map(rays), BLACK), units="radii", dither=True, estimated=True),
+        replace(share("curvature", curvature_map(), GREY), units="shaped", dither=True),
+        colored("distortion", distortion_map()),
     )
     return {entry.name: entry for entry in maps}
+
+
+def colored(name: str, compute: Compute) -> BakeMap:
+    """A map of colours in linear light, black where there is no surface."""
+    return BakeMap(name, "none", "linear light", RANGE_01, "srgb", "png", 8, compute, BLACK)
+
+
+def share(name: str, compute: Compute, background: tuple[float, ...]) -> BakeMap:
+    """A map of numbers from 0 to 1."""
+    return BakeMap(name, "none", "share", RANGE_01, "unit", "png", 8, compute, background)
+
+
+def in_tangent_space(name: str, compute: Compute, normal_format: NormalFormat) -> BakeMap:
+    """A map of unit vectors in the frame of the tangents; normal_format: what its green channel means."""
+    space = "tangent, Y up" if normal_format == "opengl" else "tangent, Y down"
+    return BakeMap(name, space, "unit vector", RANGE_11, "signed", "png", 8, compute, FLAT, dither=True)
+
+
+def in_object_space(name: str, compute: Compute) -> BakeMap:
+    """A map of unit vectors in the axes of the source."""
+    return BakeMap(name, "object", "unit vector", RANGE_11, "signed", "exr", 16, compute, BLACK)
 
 
 MAP_NAMES = (*all_maps(), HEIGHT)
