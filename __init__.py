@@ -228,7 +228,7 @@ class UnwrapResult:
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import texture_notes, write_outputs, written_notes
+        from .bake.output import BakeJob, texture_notes, write_outputs, written_notes
         from .export.assemble import invert
         from .runtime.progress import Clock
 
@@ -248,7 +248,8 @@ class UnwrapResult:
         if self.cloud is not None:
             self._write_points(output, self.cloud)
         apart = report["metrics"]["overlap_fraction"] == 0.0
-        report |= write_outputs(output, self.atlas, self.asset, outputs, maps, clock, apart=apart)
+        job = BakeJob.of(self.atlas, self.asset, outputs, maps)
+        report |= write_outputs(output, job, clock, apart=apart)
         if note is not None:
             for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)

@@ -22,7 +22,7 @@ from .raster.plan import Plan, open_rasterizer
 from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_error
 from .settings import BakeSettings
 from .texture import Texture
-from .windows import background_of, blank_gbuffer, computed, map_windows, put_together
+from .windows import Ground, background_of, blank_gbuffer, computed, map_windows, put_together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,27 +68,39 @@ def bake(
             )
         atlas, asset, maps = replace(atlas, source_vertex=np.arange(len(atlas.positions))), surface_alone(atlas), asset
     settings = from_keywords(BakeSettings, settings, keywords)
+    texels = atlas.size if settings.size is None else settings.size
     chosen = find_maps(maps or (), normal_format=settings.normal_format)
     if not chosen:
         return {}
-    texels = atlas.size if settings.size is None else settings.size
     check_size(texels)
     check_padding(settings.padding)
-    plan = Plan(texels, settings.samples, settings.limit, settings.tile)
+    tell = progress or (lambda _: None)
     drawn = [entry for entry in chosen if not entry.everywhere]
-    pixels: dict[str, NDArray[np.float32]] = {}
-    if drawn:
-        with open_rasterizer(atlas, plan, device=settings.device, warn=warn) as (rasterizer, pieces):
-            baked = map_windows(rasterizer, pieces, plan, drawn, atlas, asset, progress)
-            pixels, covered, inside = put_together(baked, texels, settings.scratch)
-        images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in drawn]
-        fill_gutters(images, covered, settings.padding)
-        if settings.padding != 0 and settings.tile is None:
-            close_seams(atlas, drawn, pixels, inside)
+    pixels = draw_maps(Ground(atlas, asset), drawn, texels, settings, tell, warn) if drawn else {}
     for entry in (entry for entry in chosen if entry.everywhere):
-        _announce(progress, entry.name)
-        pixels[entry.name] = computed(entry, blank_gbuffer(texels), atlas, asset)
+        tell(entry.name)
+        pixels[entry.name] = computed(entry, blank_gbuffer(texels), Ground(atlas, asset))
     return {entry.name: as_texture(entry, pixels[entry.name]) for entry in chosen}
+
+
+def draw_maps(
+    ground: Ground,
+    maps: Sequence[BakeMap],
+    size: int,
+    settings: BakeSettings,
+    progress: Callable[[str], None],
+    warn: Callable[[str], None] | None,
+) -> dict[str, NDArray[np.float32]]:
+    """Name → image (size, size, c) of maps that show the surface: drawn, gutters filled, seams closed."""
+    plan = Plan(size, settings.samples, settings.limit, settings.tile)
+    with open_rasterizer(ground.atlas, plan, device=settings.device, warn=warn) as (rasterizer, pieces):
+        baked = map_windows(rasterizer, pieces, plan, maps, ground, progress)
+        pixels, covered, inside = put_together(baked, size, settings.scratch)
+    images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in maps]
+    fill_gutters(images, covered, settings.padding)
+    if settings.padding != 0 and settings.tile is None:
+        close_seams(ground.atlas, maps, pixels, inside)
+    return pixels
 
 
 def find_maps(
@@ -129,8 +141,3 @@ def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:
     """Pixels with what the map says of them."""
     metadata = {"map": entry.name, "space": entry.space, "units": entry.units, "range": entry.value_range}
     return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)
-
-
-def _announce(progress: Callable[[str], None] | None, name: str) -> None:
-    if progress is not None:
-        progress(name)

@@ -15,14 +15,11 @@ from ..runtime.extras import requires
 from ..runtime.options import AUTO, AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
 from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
-from .output import bake_textures, bleeding, gutter_of, texture_facts, texture_notes, with_tangents
+from .output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ..runtime.files import OutputFolder
-    from ..runtime.mesh import Asset, Atlas
-    from .bakemap import BakeMap
+    from ..runtime.mesh import Asset
     from .highpoly.highmaps import HighSource
 
 
@@ -89,34 +86,24 @@ def bake(
         source: See HighOptions.
         console: See Console.
     """
-    padding = padding_of(options.padding, options.target, options.size)
-    options, outputs = replace(options, padding=padding), options.outputs
+    options = replace(options, padding=padding_of(options.padding, options.target, options.size))
     high = _high_source(source)
-    chosen_maps(outputs, high=high)
+    chosen_maps(options.outputs, high=high)
     from ..runtime.files import OutputFolder
     from ..runtime.io.meshfile import load
-    from ..runtime.pack.packing import atlas_from_uv
 
     asset = load(mesh)
     console.note_changes(asset)
-    atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
-    outputs = outputs.for_asset(asset) if high is None else high.outputs(outputs)
-    entries = chosen_maps(outputs, high=high, fields=options.fields, seed=options.seed)
-    if not entries:
+    job = _job(asset, options, high)
+    if not job.maps:
         raise InputError(f"maps is auto, which finds nothing to bake in {mesh.name}; pass for instance --maps ao")
-    atlas = with_tangents(atlas, entries)
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
-    facts["settings"] = settings(options, source) | {"maps": [entry.name for entry in entries]}
+    facts["settings"] = settings(options, source) | {"maps": [entry.name for entry in job.maps]}
     report = f"{asset.stem}.bake.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
-        check_outputs(folder, outputs, entries, meshes=False)
+        check_outputs(folder, job.outputs, job.maps, meshes=False)
         with console.progress() as progress:
-            if options.udim:
-                facts["tiles"] = _bake_squares(folder, atlas, asset, entries, options)
-            else:
-                baked = bake_textures(folder, atlas, asset, outputs, entries, Clock(progress))
-                facts["textures"] = texture_facts(atlas, baked)
-                facts["textures"]["clean_mip"] = bleeding(atlas, options.size, gutter_of(atlas, outputs))
+            facts |= _bake_squares(folder, job, options) if options.udim else _bake_one(folder, job, Clock(progress))
         facts |= {} if high is None else {"high": high.report()}
         folder.write_report(facts)
         written = folder.commit()
@@ -127,17 +114,32 @@ def bake(
     return 0
 
 
-def _bake_squares(
-    folder: OutputFolder, atlas: Atlas, asset: Asset, maps: Sequence[BakeMap], options: BakeOptions
-) -> list[int]:
-    """Bake and write one image for each map and square of uv; returns the squares' numbers."""
+def _job(asset: Asset, options: BakeOptions, high: HighSource | None) -> BakeJob:
+    """The maps asked for, over the uv that the asset has."""
+    from ..runtime.pack.packing import atlas_from_uv
+
+    atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
+    outputs = options.outputs.for_asset(asset) if high is None else high.outputs(options.outputs)
+    maps = chosen_maps(outputs, high=high, fields=options.fields, seed=options.seed)
+    return BakeJob.of(atlas, asset, outputs, maps)
+
+
+def _bake_one(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any]:
+    """Bake and write one image for each map; what the report says of them."""
+    textures = texture_facts(job.atlas, bake_textures(folder, job, clock))
+    textures["clean_mip"] = bleeding(job.atlas, job.atlas.size, gutter_of(job.atlas, job.outputs))
+    return {"textures": textures}
+
+
+def _bake_squares(folder: OutputFolder, job: BakeJob, options: BakeOptions) -> dict[str, Any]:
+    """Bake and write one image for each map and square of uv; the squares' numbers for the report."""
     from .udim import bake_udim, write_udim
 
-    gutter = gutter_of(atlas, options.outputs)
-    tiles = bake_udim(atlas, asset, list(maps), size=options.size, padding=gutter, samples=options.samples)
+    gutter = gutter_of(job.atlas, job.outputs)
+    tiles = bake_udim(job.atlas, job.asset, list(job.maps), size=options.size, padding=gutter, samples=options.samples)
     kind = options.texture_format
-    folder.write_several(lambda path: write_udim(tiles, path, asset.stem, file_type=kind))
-    return list(tiles)
+    folder.write_several(lambda path: write_udim(tiles, path, job.asset.stem, file_type=kind))
+    return {"tiles": list(tiles)}
 
 
 def settings(options: BakeOptions, source: HighOptions) -> dict[str, Any]:

@@ -42,29 +42,34 @@ class Baked:
     files: dict[str, str]
 
 
-def write_outputs(
-    output: OutputFolder,
-    atlas: Atlas,
-    asset: Asset,
-    outputs: Outputs,
-    maps: Sequence[BakeMap],
-    clock: Clock,
-    *,
-    apart: bool = False,
-) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class BakeJob:
+    """What is baked and written: maps of an asset over an atlas.  outputs: without "auto".  atlas: as it is written."""
+
+    atlas: Atlas
+    asset: Asset
+    outputs: Outputs
+    maps: Sequence[BakeMap]
+
+    @classmethod
+    def of(cls, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap]) -> BakeJob:
+        """With each vertex of the atlas in one tangent group, where a map is in tangent space."""
+        return cls(with_tangents(atlas, maps), asset, outputs, maps)
+
+
+def write_outputs(output: OutputFolder, job: BakeJob, clock: Clock, *, apart: bool = False) -> dict[str, Any]:
     """Textures, meshes in each format, preview; for the report what is known of "textures", and "written" of meshes.
 
-    outputs: without "auto".  apart: whether no two triangles of the atlas are known to overlap in uv.
+    apart: whether no two triangles of the atlas are known to overlap in uv.
     Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
     """
-    atlas = with_tangents(atlas, maps)
-    baked = bake_textures(output, atlas, asset, outputs, maps, clock)
+    baked = bake_textures(output, job, clock)
     with clock.stage("write"):
-        written = write_meshes(output, atlas, asset, outputs, baked, apart=apart)
-    if outputs.preview:
+        written = write_meshes(output, job.atlas, job.asset, job.outputs, baked, apart=apart)
+    if job.outputs.preview:
         with clock.stage("preview"):
-            _write_preview(output, atlas, asset)
-    return {"textures": texture_facts(atlas, baked), "written": written}
+            _write_preview(output, job.atlas, job.asset)
+    return {"textures": texture_facts(job.atlas, baked), "written": written}
 
 
 def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
@@ -76,27 +81,25 @@ def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
     return split_by_tangents(atlas)
 
 
-def bake_textures(
-    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, maps: Sequence[BakeMap], clock: Clock
-) -> Baked:
+def bake_textures(output: OutputFolder, job: BakeJob, clock: Clock) -> Baked:
     """Bake the maps, in the atlas' size and padding, and write them."""
-    if not maps:
+    if not job.maps:
         return Baked({}, {})
     from . import baker
 
-    names = [entry.name for entry in maps]
+    names = [entry.name for entry in job.maps]
     textures = baker.bake(
-        atlas,
-        asset,
-        list(maps),
-        padding=gutter_of(atlas, outputs),
-        samples=outputs.samples,
-        scratch=Path(tempfile.gettempdir()) if atlas.size >= LARGE else None,
+        job.atlas,
+        job.asset,
+        list(job.maps),
+        padding=gutter_of(job.atlas, job.outputs),
+        samples=job.outputs.samples,
+        scratch=Path(tempfile.gettempdir()) if job.atlas.size >= LARGE else None,
         progress=lambda name: clock("bake", names.index(name), len(names)),
     )
     clock("bake", len(names), len(names))
     with clock.stage("write textures"):
-        return Baked(textures, _write_files(output, textures, asset, outputs))
+        return Baked(textures, _write_files(output, textures, job.asset, job.outputs))
 
 
 def gutter_of(atlas: Atlas, outputs: Outputs) -> int | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     from .bakemap import BakeMap
     from .raster.layout import Window
     from .raster.plan import Plan, Rasterizer
+
+
+class Ground(NamedTuple):
+    """What maps are made of: the atlas that is drawn, and the asset whose faces it has."""
+
+    atlas: Atlas
+    asset: Asset
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +55,8 @@ def map_windows(
     pieces: Sequence[Window],
     plan: Plan,
     entries: Sequence[BakeMap],
-    atlas: Atlas,
-    asset: Asset,
-    progress: Callable[[str], None] | None = None,
+    ground: Ground,
+    progress: Callable[[str], None],
 ) -> Iterator[BakedWindow]:
     """Window by window, every map.  What was yielded is not changed by the next window.
 
@@ -65,9 +71,9 @@ def map_windows(
         covered = covered_texels(held, plan.along) if plan.along > 1 else held
         maps: dict[str, NDArray[np.float32]] = {}
         for entry in entries:
-            if progress is not None and number == 0:
+            if number == 0:
                 progress(entry.name)
-            pixels = _reduced(computed(entry, gbuffer, atlas, asset), held, plan.along, entry)
+            pixels = _reduced(computed(entry, gbuffer, ground), held, plan.along, entry)
             kept = any(np.may_share_memory(pixels, plane) for plane in planes)
             maps[entry.name] = pixels.copy() if kept else pixels
         inside = gbuffer.inside if plan.along == 1 else ~covered_texels(~gbuffer.inside, plan.along)
@@ -98,9 +104,9 @@ def put_together(
     return images, covered, inside
 
 
-def computed(entry: BakeMap, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+def computed(entry: BakeMap, gbuffer: GBuffer, ground: Ground) -> NDArray[np.float32]:
     """(h, w, c) float32 of one map.  Raises: InputError when its function returns another shape."""
-    pixels = entry.compute(gbuffer, atlas, asset)
+    pixels = entry.compute(gbuffer, ground.atlas, ground.asset)
     if pixels.ndim != 3 or pixels.shape[:2] != gbuffer.shape or not 1 <= pixels.shape[2] <= 4:
         raise InputError(f"map {entry.name}: its function returned {pixels.shape}; expected (*{gbuffer.shape}, 1 to 4)")
     return np.asarray(pixels, np.float32)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import MeshError
 from .colors import as_rgba
-from .polygons import triangulate
+from .polygons import triangles_of
 from .rawmesh import RawMesh, split_at_corners, to_float64
 from .text import is_number, lines_of, shown
 
@@ -130,41 +130,56 @@ def _polygons(
     words: _Words, place: int, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[int, Sequence[str]]]:
     """(c,) int64 corners, (p,) int64 sizes, and the words behind the indices of polygons that have some."""
-    text, line, end = words.text, words.line, len(words.text)
-    if count and place < end and text[place].isdecimal():
-        width = int(text[place]) + 1
-        if count * width == end - place and set(text[place::width]) == {text[place]}:
-            table = words.numbers(place, end).reshape(count, width)[:, 1:]
-            if (table == np.rint(table)).all():
-                return table.ravel().astype(np.int64), np.full(count, width - 1), {}
+    table = _uniform_polygons(words, place, count)
+    if table is not None:
+        return table.ravel(), np.full(count, table.shape[1]), {}
     corners: list[int] = []
     size: list[int] = []
     colors: dict[int, Sequence[str]] = {}
     for index in range(count):
-        try:
-            number = int(text[place])
-            own = list(map(int, text[place + 1 : place + 1 + number]))
-        except (IndexError, ValueError) as error:
-            at = f"line {line[place]}" if place < end else f"its end, line {line[-1] if line else 1},"
-            raise MeshError(
-                f"face {index} of the OFF file is not readable at {at} expected {count} faces, each a count and whole "
-                "numbers; it is cut off or damaged: export it again"
-            ) from error
-        if number < 0 or len(own) < number:
-            raise MeshError(
-                f"face {index} of the OFF file (line {line[place]}) has {number} corners, {len(own)} follow; it is cut "
-                "off or damaged: export it again"
-            )
+        own = _polygon(words, place, index)
         corners += own
-        size.append(number)
-        last = line[place + number]
-        place += 1 + number
+        size.append(len(own))
+        last = words.line[place + len(own)]
+        place += 1 + len(own)
         start = place
-        while place < end and line[place] == last:
+        while place < len(words.text) and words.line[place] == last:
             place += 1
         if place > start:
-            colors[index] = text[start:place]
+            colors[index] = words.text[start:place]
     return np.array(corners, dtype=np.int64), np.array(size, dtype=np.int64), colors
+
+
+def _uniform_polygons(words: _Words, place: int, count: int) -> NDArray[np.int64] | None:
+    """(p, s) corners of polygons that all have s of them, and no colours; None where they are not like that."""
+    text, end = words.text, len(words.text)
+    if not count or place >= end or not text[place].isdecimal():
+        return None
+    width = int(text[place]) + 1
+    if count * width != end - place or set(text[place::width]) != {text[place]}:
+        return None
+    table = words.numbers(place, end).reshape(count, width)[:, 1:]
+    return table.astype(np.int64) if (table == np.rint(table)).all() else None
+
+
+def _polygon(words: _Words, place: int, index: int) -> list[int]:
+    """The corners of the polygon at a word, which is their number.  Raises: MeshError where they are not there."""
+    text, line = words.text, words.line
+    try:
+        number = int(text[place])
+        own = list(map(int, text[place + 1 : place + 1 + number]))
+    except (IndexError, ValueError) as error:
+        at = f"line {line[place]}" if place < len(text) else f"its end, line {line[-1] if line else 1},"
+        raise MeshError(
+            f"face {index} of the OFF file is not readable at {at} expected a count and as many whole numbers; "
+            "it is cut off or damaged: export it again"
+        ) from error
+    if number < 0 or len(own) < number:
+        raise MeshError(
+            f"face {index} of the OFF file (line {line[place]}) has {number} corners, {len(own)} follow; it is cut "
+            "off or damaged: export it again"
+        )
+    return own
 
 
 def _mesh(
@@ -174,32 +189,22 @@ def _mesh(
     size: NDArray[np.int64],
     face_colors: dict[int, Sequence[str]],
 ) -> RawMesh:
-    whole = size >= 3
-    if not whole.any():
-        raise MeshError(f"the OFF file holds {len(size)} faces, none with three corners or more; check the export")
-    outside = (corners < 0) | (corners >= len(table))
-    if outside.any():
-        face = int(np.searchsorted(np.cumsum(size), np.argmax(outside), side="right"))
-        raise MeshError(
-            f"face {face} refers to vertex {corners[np.argmax(outside)]}, expected 0 to {len(table) - 1}; "
-            "the mesh is damaged: export it again"
-        )
-    inside = np.repeat(whole, size)
     positions = table[:, :3]
-    triangles, polygon = triangulate(positions, corners[inside], size[whole])
+    found = triangles_of(positions, corners, size, "OFF")
     normals = 3 * ("N" in extra)
     color_end = table.shape[1] - 2 * ("T" in extra)
     part = RawMesh(
         positions=positions,
-        faces=corners[inside][triangles],
+        faces=found.faces,
         normals=table[:, 3:6] if normals else None,
         colors=_rgba(table[:, 3 + normals : color_end]),
         uv=table[:, -2:] if "T" in extra else None,
-        changes={"faces_under_three_corners": int(np.count_nonzero(~whole))},
+        changes={"faces_under_three_corners": found.left_out},
     )
     colors = _face_rgba(face_colors, len(size)) if part.colors is None else None
-    face = np.flatnonzero(whole)[polygon]
-    return part if colors is None else split_at_corners(part, colors=np.repeat(colors[face][:, None], 3, axis=1))
+    if colors is None:
+        return part
+    return split_at_corners(part, colors=np.repeat(colors[found.polygon][:, None], 3, axis=1))
 
 
 def _rgba(colors: NDArray[np.float64]) -> NDArray[np.uint8] | None:

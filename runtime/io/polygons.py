@@ -8,15 +8,60 @@ other corner lies in its triangle; cutting it off changes only whether its two n
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from ..errors import MeshError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FLAT = 1e-12
 """Twice the area of a triangle of a polygon of extent 1 below which its corners count as in one line."""
+
+
+class Triangles(NamedTuple):
+    """The polygons of a file as triangles.
+
+    faces: (f, 3) int64 vertices.  corner: (f, 3) int64 places in the list of all corners.  polygon: (f,) int64 number
+    of each one's polygon in the file.  left_out: how many polygons have under three corners.
+    """
+
+    faces: NDArray[np.int64]
+    corner: NDArray[np.int64]
+    polygon: NDArray[np.int64]
+    left_out: int
+
+
+def triangles_of(
+    points: NDArray[np.float64], corners: NDArray[np.int64], size: NDArray[np.int64], kind: str
+) -> Triangles:
+    """Triangles of the polygons that have three corners or more.
+
+    Args:
+        points: (n, 3) float64.
+        corners: (c,) int64, meant to be vertices.
+        size: (p,) int64 corners of each polygon, in their order.
+        kind: name of the format, for messages.
+
+    Raises:
+        MeshError: a corner is no vertex, or no polygon has three corners.
+    """
+    outside = (corners < 0) | (corners >= len(points))
+    if outside.any():
+        face = int(np.searchsorted(np.cumsum(size), np.argmax(outside), side="right"))
+        raise MeshError(
+            f"face {face} refers to vertex {corners[np.argmax(outside)]}, expected 0 to {len(points) - 1}; "
+            "the mesh is damaged: export it again"
+        )
+    whole = size >= 3
+    if not whole.any():
+        raise MeshError(f"all {len(size)} faces of the {kind} file have under three corners; check the export")
+    inside = np.flatnonzero(np.repeat(whole, size))
+    triangles, polygon = triangulate(points, corners[inside], size[whole])
+    corner = inside[triangles]
+    return Triangles(corners[corner], corner, np.flatnonzero(whole)[polygon], int(np.count_nonzero(~whole)))
 
 
 def triangulate(

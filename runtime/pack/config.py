@@ -68,6 +68,8 @@ class LatticeConfig:
 
     height: float = 2.0
     """Least height of a triangle there: from √2 on, rounding can't turn it over."""
+    aim: float = 0.1
+    """Share of that height by which a triangle is raised beyond it, so that it doesn't come back for the last digit."""
     deepest: float = 64.0
     """How far faces may overlap, or a triangle be turned over, to be repaired: more is a fault of the chart."""
     relaxation: float = 1.8

@@ -112,10 +112,10 @@ def _repaired(
         faults = _Faults.of(rounded, faces, sign, near | active, together=False)
         if not faults.any:
             return rounded
-        ring = ring or _Ring.of(faces, len(exact))
+        ring = ring or _Ring.of(faces, sign, len(exact))
         active[faults.faces] = True
         contacts = contacts.and_also(faults.contacts)
-        points, active = _relaxed(points, faces, sign, active, contacts, ring, config)
+        points, active = _relaxed(points, ring, active, contacts, config)
     return np.clip(np.rint(points), 0.0, float(STEPS))
 
 
@@ -181,17 +181,18 @@ def _chart_signs(
 
 @dataclass(frozen=True, eq=False)
 class _Ring:
-    """The faces around each vertex: face[first[v] : first[v + 1]]."""
+    """Faces (f, 3) with their signs (f,), and those around each vertex: face[first[v] : first[v + 1]]."""
 
+    faces: NDArray[np.int64]
+    sign: NDArray[np.float64]
     face: NDArray[np.int64]
     first: NDArray[np.int64]
 
     @classmethod
-    def of(cls, faces: NDArray[np.int64], count: int) -> _Ring:
+    def of(cls, faces: NDArray[np.int64], sign: NDArray[np.float64], count: int) -> _Ring:
         corner = faces.reshape(-1)
-        return cls(
-            np.argsort(corner, kind="stable") // 3, np.append(0, np.cumsum(np.bincount(corner, minlength=count)))
-        )
+        first = np.append(0, np.cumsum(np.bincount(corner, minlength=count)))
+        return cls(faces, sign, np.argsort(corner, kind="stable") // 3, first)
 
     def count(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
         """How many faces lie around each of the vertices."""
@@ -206,19 +207,17 @@ class _Ring:
 
 def _relaxed(
     points: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    sign: NDArray[np.float64],
+    ring: _Ring,
     active: NDArray[np.bool_],
     contacts: _Triples,
-    ring: _Ring,
     config: LatticeConfig,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Points and the faces (f,) that were kept high on the way: those active, and all around a vertex that moved."""
     points, active = points.copy(), active.copy()
     rows = np.flatnonzero(active)
     for _ in range(config.sweeps):
-        triples = _Triples(faces[rows], sign[rows], np.zeros(len(rows), dtype=bool)).and_also(contacts)
-        vertex, step = _projected(points, triples, config.height)
+        triples = _Triples(ring.faces[rows], ring.sign[rows], np.zeros(len(rows), dtype=bool)).and_also(contacts)
+        vertex, step = _projected(points, triples, config)
         if len(vertex) == 0:
             break
         points[vertex] += config.relaxation * step
@@ -230,20 +229,20 @@ def _relaxed(
 
 
 def _projected(
-    points: NDArray[np.float64], triples: _Triples, height: float
+    points: NDArray[np.float64], triples: _Triples, config: LatticeConfig
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Vertices (m,) and steps (m, 2) that raise what is too low: each triple's projection, averaged at the vertices."""
     corner = points[triples.corner]
     edge = np.roll(corner, -1, axis=1) - corner
     square = (edge**2).sum(axis=2)
     base = np.sqrt(np.where(triples.contact, square[:, 0], square.max(axis=1)))
-    lack = height * base - triples.sign * _doubled(corner)
+    lack = config.height * base - triples.sign * _doubled(corner)
     low = np.flatnonzero((lack > 0.0) | (base == 0.0))
-    lack = np.maximum(lack + _AIM * height * base, 0.0)[low]
+    lack = np.maximum(lack + config.aim * config.height * base, 0.0)[low]
     across = np.roll(edge[low], -1, axis=1)  # the edge that faces each corner
     slope = triples.sign[low, None, None] * np.stack([-across[..., 1], across[..., 0]], axis=2)
     share = lack / np.maximum(square[low].sum(axis=1), np.finfo(np.float64).tiny)
-    step = np.where((base[low] > 0.0)[:, None, None], share[:, None, None] * slope, _APART * height)
+    step = np.where((base[low] > 0.0)[:, None, None], share[:, None, None] * slope, _APART * config.height)
     turn = np.where(triples.sign[low, None] < 0.0, [1.0, -1.0], 1.0)
     step = np.where((base[low] > 0.0)[:, None, None], step, step * turn[:, None])
     vertex, index = np.unique(triples.corner[low], return_inverse=True)
@@ -253,8 +252,6 @@ def _projected(
     return vertex, total / count[:, None]
 
 
-_AIM = 0.1
-"""How much higher than needed a triple is raised, so that it doesn't come back for the last digit."""
 _APART = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 """Where the corners of a triangle go that lie in one point, in heights."""
 

@@ -75,27 +75,14 @@ def pack(
     _check(asset, charts, size, padding)
     edges = outline_edges(asset.surface.faces, charts)
     first, report = _placed(charts, chart_outlines(charts, edges), size, padding, config, seed)
-    fit = partial(_fitted, asset, charts, edges, first, (size, padding), config)
+    fit = partial(_fitted, asset.surface.faces, charts, edges, _Place(first, size, padding), config)
     fitted = fit(2.0)
     for _ in range(config.lattice.retries):
         if fitted.snapped.farthest <= fitted.slack:
             break
         fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
     snapped, placement = fitted.snapped, fitted.placement
-    faces, source_vertex, _ = split_vertices(asset.faces, charts.face_chart, charts.corner_uv)
-    uv = np.zeros((len(source_vertex), 2), dtype=np.float32)
-    uv[faces.reshape(-1)] = snapped.points[fitted.faces.reshape(-1)] / STEPS
-    atlas = Atlas(
-        positions=asset.positions[source_vertex],
-        faces=faces,
-        uv=uv,
-        normals=atlas_normals(asset, source_vertex),
-        face_chart=charts.face_chart,
-        source_vertex=source_vertex,
-        size=size,
-        padding=padding,
-        placement=placement,
-    )
+    atlas = _as_atlas(asset, charts, fitted, size, padding)
     report |= {
         "chart_scale": float(np.sqrt(np.linalg.det(placement[0, :, :2]))),
         "skipped_growth_steps": fitted.skipped,
@@ -125,6 +112,32 @@ def _placed(
     return np.concatenate([linear, layout.origin[:, :, None]], axis=2), limits
 
 
+def _as_atlas(asset: Asset, charts: Charts, fitted: _Fitted, size: int, padding: int) -> Atlas:
+    """The mesh with vertices doubled along seams, and the lattice points as their uv."""
+    faces, source_vertex, _ = split_vertices(asset.faces, charts.face_chart, charts.corner_uv)
+    uv = np.zeros((len(source_vertex), 2), dtype=np.float32)
+    uv[faces.reshape(-1)] = fitted.snapped.points[fitted.faces.reshape(-1)] / STEPS
+    return Atlas(
+        positions=asset.positions[source_vertex],
+        faces=faces,
+        uv=uv,
+        normals=atlas_normals(asset, source_vertex),
+        face_chart=charts.face_chart,
+        source_vertex=source_vertex,
+        size=size,
+        padding=padding,
+        placement=fitted.placement,
+    )
+
+
+class _Place(NamedTuple):
+    """A first placement (k, 2, 3) in an atlas of so many texels, with so many of padding."""
+
+    placement: NDArray[np.float64]
+    size: int
+    padding: int
+
+
 class _Fitted(NamedTuple):
     """Charts that jammed, on the lattice: faces (f, 3) over its points, one for each place of a vertex in a chart."""
 
@@ -136,21 +149,20 @@ class _Fitted(NamedTuple):
 
 
 def _fitted(
-    asset: Asset,
+    mesh: NDArray[np.int64],
     charts: Charts,
     edges: NDArray[np.bool_],
-    first: NDArray[np.float64],
-    texels: tuple[int, int],
+    first: _Place,
     config: PackConfig,
     slack: float,
 ) -> _Fitted:
-    """Charts grown from their first placement (k, 2, 3), with slack lattice units more than the padding, and snapped.
+    """Charts of faces mesh (f, 3), grown from where they were placed and snapped to the lattice.
 
-    texels: size and padding.
+    slack: what is kept free beyond the padding, lattice units.
     """
     outlines = chart_outlines(charts, edges)
-    placement, skipped = grown(first, outlines, *texels, config.growth, slack=slack / STEPS)
-    faces, _, flat = split_vertices(asset.surface.faces, charts.face_chart, charts.corner_uv)
+    placement, skipped = grown(first.placement, outlines, first.size, first.padding, config.growth, slack=slack / STEPS)
+    faces, _, flat = split_vertices(mesh, charts.face_chart, charts.corner_uv)
     chart = np.zeros(len(flat), dtype=np.int64)
     chart[faces] = charts.face_chart[:, None]
     uv = apply_placement(placement, chart, flat[:, None])[:, 0]

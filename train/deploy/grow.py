@@ -51,10 +51,14 @@ class Nodes(NamedTuple):
 class Decided:
     """What is settled so far.
 
-    codes: slot → gate g, or −1 − expert.  gates: (·, d + 1) a level.  rows, experts: samples and their experts.
+    grid: the coarsest cells.  occupied: (o,) those with samples.  codes: slot → gate g, or −1 − expert.  depth: levels
+    of gates.  gates: (·, d + 1) a level.  rows, owners: samples, and the expert of each.
     """
 
+    grid: Grid
+    occupied: NDArray[np.int64]
     codes: NDArray[np.int64]
+    depth: int = 0
     gates: list[NDArray[np.float64]] = field(default_factory=list)
     rows: list[NDArray[np.int64]] = field(default_factory=list)
     owners: list[NDArray[np.int64]] = field(default_factory=list)
@@ -85,13 +89,13 @@ def grow_on(grid: Grid, lesson: Lesson, config: GrowConfig, tolerance: float, rn
     cells = grid.number(lesson.x.astype(np.float32))
     order = np.argsort(cells, kind="stable")
     slot, first = np.unique(cells[order], return_index=True)
-    nodes, decided, depth = Nodes(order, first, slot), Decided(np.zeros(grid.count, dtype=np.int64)), 0
+    nodes, decided = Nodes(order, first, slot), Decided(grid, slot, np.zeros(grid.count, dtype=np.int64))
     apart = _apart(lesson, config.apart)
     while len(nodes.first):
-        done = _is_done(apart, nodes, config, tolerance, decided) | (depth >= config.deepest)
+        done = _is_done(apart, nodes, config, tolerance, decided) | (decided.depth >= config.deepest)
         nodes = _halve(apart, nodes, done, config, decided, rng)
-        depth += len(nodes.first) > 0
-    return _assembled(lesson, grid, slot, decided, depth, config, tolerance)
+        decided.depth += len(nodes.first) > 0
+    return _assembled(lesson, decided, config, tolerance)
 
 
 def lay_grid(x: NDArray[np.float64], most: int, longest: int) -> Grid:
@@ -215,40 +219,44 @@ def _settle(nodes: Nodes, gated: NDArray[np.bool_], decided: Decided) -> None:
     decided.expert_count += int(np.count_nonzero(~gated))
 
 
-def _assembled(
-    lesson: Lesson,
-    grid: Grid,
-    occupied: NDArray[np.int64],
-    decided: Decided,
-    depth: int,
-    config: GrowConfig,
-    tolerance: float,
-) -> GatedExperts:
+class _Experts(NamedTuple):
+    """Affine maps of experts: slope (e, m, d) and bias (e, m); centre (e, d) of their samples, and radius (e,)."""
+
+    slope: NDArray[np.float64]
+    bias: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    radius: NDArray[np.float64]
+
+
+def _assembled(lesson: Lesson, decided: Decided, config: GrowConfig, tolerance: float) -> GatedExperts:
     """The network: experts fitted to the samples of their own label; cells without samples begin like the nearest."""
-    rows, owner = np.concatenate(decided.rows), np.concatenate(decided.owners)
+    rows, owner, grid = np.concatenate(decided.rows), np.concatenate(decided.owners), decided.grid
     label, share = _majority(lesson.label[rows], owner, decided.expert_count)
     own = lesson.label[rows] == label[owner]
-    rows, owner = rows[own], owner[own]
-    order = np.argsort(owner, kind="stable")
-    own, first = lesson.among(rows[order]), np.searchsorted(owner[order], np.arange(decided.expert_count))
-    fitted = untorn(own, first, fit_affine(own, first, config.ridge), config.torn * tolerance, config.steepest)
-    bias = fitted.mean_y - np.einsum("kmd,kd->km", fitted.slope, fitted.mean_x)
-    away = np.linalg.norm(own.x - fitted.mean_x[owner[order]], axis=1)
+    order = np.argsort(owner[own], kind="stable")
+    experts = _experts(lesson.among(rows[own][order]), owner[own][order], decided.expert_count, config, tolerance)
     codes = np.where(decided.codes < 0, decided.gate_count - 1 - decided.codes, decided.codes).astype(np.int32)
     return GatedExperts(
         grid=grid,
-        start=codes[: grid.count][nearest_cells(grid, occupied)],
+        start=codes[: grid.count][nearest_cells(grid, decided.occupied)],
         gates=np.concatenate(decided.gates).astype(np.float32),
         sides=codes[grid.count :].reshape(-1, 2),
-        depth=depth,
-        weights=np.concatenate([fitted.slope, bias[:, :, None]], axis=2).astype(np.float32),
+        depth=decided.depth,
+        weights=np.concatenate([experts.slope, experts.bias[:, :, None]], axis=2).astype(np.float32),
         label=label,
-        centre=fitted.mean_x.astype(np.float32),
-        radius=np.maximum(config.slack * np.maximum.reduceat(away, first), config.near * float(grid.cell.max())).astype(
-            np.float32
-        ),
+        centre=experts.centre.astype(np.float32),
+        radius=np.maximum(experts.radius, config.near * float(grid.cell.max())).astype(np.float32),
         share=share.astype(np.float32),
     )
+
+
+def _experts(own: Lesson, owner: NDArray[np.int64], count: int, config: GrowConfig, tolerance: float) -> _Experts:
+    """So many experts, fitted to samples that come expert by expert: owner (n,)."""
+    first = np.searchsorted(owner, np.arange(count))
+    fitted = untorn(own, first, fit_affine(own, first, config.ridge), config.torn * tolerance, config.steepest)
+    bias = fitted.mean_y - np.einsum("kmd,kd->km", fitted.slope, fitted.mean_x)
+    away = np.linalg.norm(own.x - fitted.mean_x[owner], axis=1)
+    return _Experts(fitted.slope, bias, fitted.mean_x, config.slack * np.maximum.reduceat(away, first))
 
 
 def _majority(

@@ -16,7 +16,7 @@ from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
 from ..colors import as_rgba
 from ..pictures import decode_image
-from ..polygons import strip_triangles, triangulate
+from ..polygons import Triangles, strip_triangles, triangles_of
 from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body
 from .header import FACES, ply_header
@@ -131,44 +131,31 @@ def _with_faces(raw: RawMesh, table: Table, header: PlyHeader, read_sibling: Cal
     lists = next((table[name] for name in CORNERS if isinstance(table.get(name), Lists)), None)
     if not isinstance(lists, Lists):
         raise MeshError(f"the PLY faces have {[*table]}, expected a list vertex_indices; check the export")
-    corners, size = lists.values.astype(np.int64), lists.size
-    whole = size >= 3
-    inside = np.repeat(whole, size)
-    changes = {"faces_under_three_corners": int(np.count_nonzero(~whole))}
-    outside = (corners < 0) | (corners >= len(raw.positions))
-    if outside.any():
-        face = int(np.searchsorted(np.cumsum(size), np.argmax(outside), side="right"))
-        raise MeshError(
-            f"face {face} refers to vertex {corners[np.argmax(outside)]}, expected 0 to {len(raw.positions) - 1}; "
-            "the mesh is damaged: export it again"
-        )
-    if not whole.any():
-        raise MeshError(f"all {len(size)} faces of the PLY file have under three corners; check the export")
-    triangles, polygon = triangulate(raw.positions, corners[inside], size[whole])
-    face = np.flatnonzero(whole)[polygon]
-    materials, face_material = _materials(table, face, header, read_sibling, changes)
-    part = replace(
-        raw,
-        faces=corners[inside][triangles],
-        materials=materials,
-        face_material=face_material,
-        changes=changes,
-    )
-    face_colors, face_uv = _colors(table), table.get("texcoord")
-    if face_colors is not None and (face_colors == 255).all():  # MeshLab writes white where there are none
-        face_colors = None
-    if face_colors is not None and raw.colors is not None:
-        changes["dropped_face_colors"], face_colors = len(part.faces), None
-    if isinstance(face_uv, Lists) and face_uv.size.any():
-        if (face_uv.size == 2 * size).all():
-            at_corner = to_float64(face_uv.values).reshape(-1, 2)[inside][triangles]
-            part = split_at_corners(part, uv=at_corner)
-        else:
-            changes["faces_without_uv"] = len(part.faces)
-            part = replace(part, uv=None)
-    if face_colors is not None:
-        part = split_at_corners(part, colors=np.repeat(face_colors[face][:, None], 3, axis=1))
-    return part
+    found = triangles_of(raw.positions, lists.values.astype(np.int64), lists.size, "PLY")
+    changes = {"faces_under_three_corners": found.left_out}
+    materials, face_material = _materials(table, found.polygon, header, read_sibling, changes)
+    part = replace(raw, faces=found.faces, materials=materials, face_material=face_material, changes=changes)
+    return _with_face_colors(_with_corner_uv(part, table, lists.size, found), table, found)
+
+
+def _with_corner_uv(part: RawMesh, table: Table, size: NDArray[np.int64], found: Triangles) -> RawMesh:
+    """With the uv that faces have for each corner, where they have as many as corners: size (p,)."""
+    uv = table.get("texcoord")
+    if not isinstance(uv, Lists) or not uv.size.any():
+        return part
+    if (uv.size != 2 * size).any():
+        return replace(part, uv=None, changes={**part.changes, "faces_without_uv": len(part.faces)})
+    return split_at_corners(part, uv=to_float64(uv.values).reshape(-1, 2)[found.corner])
+
+
+def _with_face_colors(part: RawMesh, table: Table, found: Triangles) -> RawMesh:
+    """With the colours of faces, where vertices have none."""
+    colors = _colors(table)
+    if colors is None or (colors == 255).all():  # MeshLab writes white where there are none
+        return part
+    if part.colors is not None:
+        return replace(part, changes={**part.changes, "dropped_face_colors": len(part.faces)})
+    return split_at_corners(part, colors=np.repeat(colors[found.polygon][:, None], 3, axis=1))
 
 
 def _materials(
