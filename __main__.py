@@ -97,8 +97,13 @@ def unwrap(
     if mesh is None or output is None:
         missing = "--mesh" if mesh is None else "--output"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
-    options = replace(options, padding=padding_of(options.padding, outputs.target, options.size))
+    options = replace(options, padding=_padding(options, outputs))
     return _perform(Run(mesh.absolute(), output, options, outputs, checkpoints.every), console)
+
+
+def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
+    """The padding asked for, by number or by target."""
+    return padding_of(options.padding, outputs.target, options.size, light=outputs.uv_set is not None)
 
 
 def _perform(run: Run, console: Console) -> int:
@@ -187,7 +192,7 @@ def export(
         outputs: See Outputs.
         console: See Console.
     """
-    margin = replace(options, padding=padding_of(options.padding, outputs.target, options.size)).margin
+    margin = replace(options, padding=_padding(options, outputs)).margin
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
 

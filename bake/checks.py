@@ -99,14 +99,17 @@ def check_green(outputs: Outputs) -> None:
         raise InputError(f"format usda beside {green} normal maps, expected opengl; leave usda or that choice out")
 
 
-def padding_of(padding: int | None, target: str | None, size: int) -> int | None:
-    """The padding asked for, else that of the target, else None.  Raises: InputError for an unknown target."""
+def padding_of(padding: int | None, target: str | None, size: int, *, light: bool = False) -> int | None:
+    """The padding asked for, else that of the target, else None.  light: for a light map.
+
+    Raises: InputError for an unknown target.
+    """
     if target is None:
         return padding
     with requires("bake"):
         from .files.targets import find_target
     preset = find_target(target)
-    return preset.padding(size) if padding is None else padding
+    return preset.padding(size, light=light) if padding is None else padding
 
 
 def possible_files(stem: str, outputs: Outputs, maps: Sequence[BakeMap]) -> list[str]:

@@ -12,14 +12,26 @@ from .. import __version__
 from ..runtime.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
-from ..runtime.options import AUTO, AtlasOptions, Flag, MapOptions, Names, Output, Outputs, Paths, Seeded, demand
+from ..runtime.options import (
+    AUTO,
+    LAST_SET,
+    AtlasOptions,
+    Flag,
+    MapOptions,
+    Names,
+    Output,
+    Outputs,
+    Paths,
+    Seeded,
+    demand,
+)
 from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
 from .output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 
 if TYPE_CHECKING:
     from ..runtime.files import OutputFolder
-    from ..runtime.mesh import Asset
+    from ..runtime.mesh import Asset, Atlas
     from .highpoly.highmaps import HighSource
 
 
@@ -32,6 +44,8 @@ class BakeOptions(Seeded, AtlasOptions, MapOptions):
     the normals of a high-poly mesh."""
     fields: Annotated[Paths, Parameter(name="--field")] = ()
     """An ONNX file from points to channels, which becomes a map; may be given several times."""
+    uv_set: int | None = None
+    """The uv set that is baked onto, 0 to 7; by default the one that the material's textures are read with."""
     udim: Flag = False
     """Bake uv beyond the unit square into further images, STEM_MAP.1001.png and so on."""
 
@@ -39,6 +53,8 @@ class BakeOptions(Seeded, AtlasOptions, MapOptions):
         for concern in (MapOptions, AtlasOptions, Seeded):
             concern.__post_init__(self)
         demand(bool(self.maps or self.fields), "maps is none, expected at least one; pass for instance --maps normal")
+        fits = self.uv_set is None or 0 <= self.uv_set <= LAST_SET
+        demand(fits, f"uv-set is {self.uv_set}, expected 0 to {LAST_SET}; pass for instance --uv-set 1")
         both = self.udim and (self.target is not None or self.layers)
         demand(not both, "udim with a target or layers, expected one of the three; leave the others out")
 
@@ -94,7 +110,7 @@ def bake(
 
     asset = load(mesh)
     console.note_changes(asset)
-    job = _job(asset, options, high)
+    job = _job(_layout(asset, options, console), asset, options, high)
     if not job.maps:
         raise InputError(f"maps is auto, which finds nothing to bake in {mesh.name}; pass for instance --maps ao")
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
@@ -114,11 +130,26 @@ def bake(
     return 0
 
 
-def _job(asset: Asset, options: BakeOptions, high: HighSource | None) -> BakeJob:
-    """The maps asked for, over the uv that the asset has."""
+def _layout(asset: Asset, options: BakeOptions, console: Console) -> Atlas:
+    """The uv that are baked onto; what makes them unfit for that is said, or refused when strict."""
+    from ..runtime.geometry.layout import layout_faults
+    from ..runtime.io.gltf.uvsets import uv_of_set
     from ..runtime.pack.packing import atlas_from_uv
+    from .square import into_square
 
-    atlas = replace(atlas_from_uv(asset), size=options.size, padding=options.margin)
+    laid_out = asset if options.uv_set is None else replace(asset, uv=uv_of_set(asset, options.uv_set))
+    atlas = replace(atlas_from_uv(laid_out), size=options.size, padding=options.margin)
+    console.demand_none(asset.stem, layout_faults(atlas.corner_uv, tiles=options.udim))
+    if options.udim:
+        return atlas
+    atlas, left_out = into_square(atlas)
+    if left_out:
+        console.note(f"{asset.stem}: {left_out} faces span several repeats of the texture and are not baked")
+    return atlas
+
+
+def _job(atlas: Atlas, asset: Asset, options: BakeOptions, high: HighSource | None) -> BakeJob:
+    """The maps asked for, over the uv of the atlas."""
     outputs = options.outputs.for_asset(asset) if high is None else high.outputs(options.outputs)
     maps = chosen_maps(outputs, high=high, fields=options.fields, seed=options.seed)
     return BakeJob.of(atlas, asset, outputs, maps)

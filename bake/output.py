@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..runtime.errors import MissingDependencyError
 from ..runtime.extras import requires
 from ..runtime.io.gltf.instances import every_instance
+from ..runtime.material import used_materials
 from ..runtime.options import SCENES
 from .checks import exr_settings
 
@@ -139,10 +140,11 @@ def write_meshes(
     """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
     from .files.written import Reading, parts_of, written_report
 
+    asset = _as_scene(asset, outputs)
     spread, own = every_instance(atlas, asset)
     writers: dict[str, Callable[[Path], None]] = {
-        "glb": lambda path: _write_gltf(atlas, asset, baked, path),
-        "gltf": lambda path: _write_gltf(atlas, asset, baked, path),
+        "glb": lambda path: _write_gltf(atlas, asset, baked, path, outputs.uv_set),
+        "gltf": lambda path: _write_gltf(atlas, asset, baked, path, outputs.uv_set),
         "obj": lambda path: _write_obj(spread, baked, path),
         "ply": lambda path: _write_ply(spread, asset, path),
         "usda": lambda path: _write_usda(spread, asset, baked, path),
@@ -156,7 +158,7 @@ def write_meshes(
     for kind in (name for name in writers if name in outputs.formats):
         output.write(f"{output.stem}.{kind}", partial(write, kind))
     uv = atlas.uv[atlas.faces]
-    order, parts = parts_of(atlas, asset)
+    order, parts = parts_of(asset, outputs.uv_set or 0)
     scenes = {kind: path for kind, path in staged.items() if kind in SCENES}
     plain = {kind: path for kind, path in staged.items() if kind not in SCENES}
     return {
@@ -165,15 +167,25 @@ def write_meshes(
     }
 
 
-def _write_gltf(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
-    """A .glb or .gltf file: the source's own document with new uv, where it is one."""
+def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
+    """With a document for what is written as one: several materials, or uv that go beside others."""
+    wanted = outputs.uv_set is not None or len(used_materials(asset)) > 1
+    if asset.document is not None or not wanted or set(SCENES).isdisjoint(outputs.formats):
+        return asset
+    with requires("bake"):
+        from .files.gltfmade import with_document
+    return with_document(asset)
+
+
+def _write_gltf(atlas: Atlas, asset: Asset, baked: Baked, path: Path, uv_set: int | None) -> None:
+    """A .glb or .gltf file: the document with new uv, where there is one."""
     with requires("bake"):
         from .files.gltf import write_glb
         from .files.gltfscene import Page, write_scene
     if asset.document is None:
         write_glb(atlas, asset, baked.textures, path)
     else:
-        write_scene([Page(atlas, asset, baked.textures)], path)
+        write_scene([Page(atlas, asset, baked.textures, uv_set)], path)
 
 
 def _write_obj(atlas: Atlas, baked: Baked, path: Path) -> None:

@@ -61,11 +61,17 @@ class Console:
         """
         from .io.changes import told
 
-        facts = told({**source.changes, **(lost or {})})
+        self.demand_none(source.stem, told({**source.changes, **(lost or {})}))
+
+    def demand_none(self, stem: str, facts: Sequence[str]) -> None:
+        """A note for each fact about a file that the user might not expect.
+
+        Raises: InputError that names them all, when strict.
+        """
         if self.strict and facts:
-            raise InputError(f"{source.stem}: {'; '.join(facts)}: expected no change, as asked; leave --strict out")
+            raise InputError(f"{stem}: {'; '.join(facts)}; expected nothing of the kind, as asked: leave --strict out")
         for fact in facts:
-            self.note(f"{source.stem}: {fact}")
+            self.note(f"{stem}: {fact}")
 
     def note(self, fact: str) -> None:
         """One line on stderr about something that the user should know and need not act on; nothing when quiet."""

@@ -80,8 +80,9 @@ class Asset:
     normals: (n, 3) unit float64 or None.  colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
     face_material: (f,) int64 into materials.  changes: what cleaning did, name → count, only non-zero entries.
     sha256: hex digest of the source file's bytes ("" when made in memory).  stem: base name for outputs.
-    origin: (n,) int64, the row of the document that each file vertex is, or None.  document: the scene that the mesh
-    is the surface of, each of its meshes once; None for a file that holds nothing but a mesh.
+    document: the scene that the mesh is the surface of, each of its meshes once; None for a file that holds nothing
+    but a mesh.  part: (f,) int64, the part of it that each face is in; origin: (n,) int64, the vertex of that part that
+    each file vertex is; both None without a document.
     """
 
     positions: NDArray[np.float64]
@@ -96,6 +97,7 @@ class Asset:
     changes: dict[str, int] = field(default_factory=dict)
     sha256: str = ""
     stem: str = "mesh"
+    part: NDArray[np.int64] | None = None
     origin: NDArray[np.int64] | None = None
     document: Document | None = None
 

@@ -38,6 +38,8 @@ LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
 AUTO = "auto"
+LAST_SET = 7
+"""Of uv sets that programs read."""
 
 
 def names(text: str) -> tuple[str, ...]:
@@ -218,6 +220,9 @@ class FileOptions:
     formats: Annotated[Names, Parameter(name="--format")] = ("glb",)
     """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda.  glb and gltf keep all that a
     glTF scene holds."""
+    uv_set: int | None = None
+    """The uv set that the new uv become, 0 to 7, while other sets, materials and textures stay: 1 is usual for light
+    maps.  By default the new uv are set 0, textures are baked onto them, and old sets follow."""
     inverse: Flag = False
     """Also write STEM.wrap.onnx, the network from uv and chart to point and normal."""
     preview: bool | None = None
@@ -227,6 +232,10 @@ class FileOptions:
         found, known = ", ".join(self.formats), ", ".join(FORMATS)
         usable = len(self.formats) > 0 and set(self.formats) <= set(FORMATS)
         demand(usable, f"format is {found!r}, expected some of {known}; pass for instance --format glb")
+        if self.uv_set is not None:
+            fits, several = 0 <= self.uv_set <= LAST_SET, set(self.formats) <= set(SCENES)
+            demand(fits, f"uv-set is {self.uv_set}, expected 0 to {LAST_SET}; pass for instance --uv-set 1")
+            demand(several, f"uv-set with format {found}, which holds one set, expected glb or gltf; leave one out")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,7 +259,7 @@ class Outputs(FileOptions, MapOptions):
         """
         from .material import refuse_unread, source_maps
 
-        auto = source_maps(asset)
+        auto = source_maps(asset) if self.uv_set is None else ()
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
         refuse_unread(asset, maps)
         drawn = bool(self.maps) if self.preview is None else self.preview

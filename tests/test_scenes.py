@@ -6,6 +6,7 @@ import importlib.util
 import json
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -22,6 +23,11 @@ def _helper(name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def tree_of(path: Path) -> dict[str, Any]:
+    data = path.read_bytes()
+    return json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
 
 
 @pytest.fixture
@@ -71,8 +77,40 @@ def test_a_texture_that_cannot_be_decoded_is_refused_or_stays(
     assert "the base-color texture of material Paint" in capsys.readouterr().err
     assert instant_training == []
     assert main(["unwrap", str(path), "-o", str(tmp_path / "out"), *QUICK]) == 0
-    data = (tmp_path / "out" / "scene.glb").read_bytes()
-    tree = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    tree = tree_of(tmp_path / "out" / "scene.glb")
     assert tree["textures"][0] == made.tree["textures"][0]
     assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0, "texCoord": 1}
     assert len(load_asset(path).faces) == len(load_asset(tmp_path / "out" / "scene.glb").faces)
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_light_map_uv_go_to_the_set_asked_for_and_all_else_stays(scene: Path, tmp_path: Path) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--uv-set", "2", "--maps", "ao", "--size", "64"]
+    assert main([*argv, "--target", "godot", "--no-preview", "--quiet"]) == 0
+    before, after = (tree_of(path) for path in (scene, tmp_path / "out" / "scene.glb"))
+    for old, new in zip(before["meshes"], after["meshes"], strict=True):
+        for one, other in zip(old["primitives"], new["primitives"], strict=True):
+            sets = {f"TEXCOORD_{number}" for number in range(3)}
+            assert set(other["attributes"]) == set(one["attributes"]) | sets
+    for old, new in zip(before["materials"], after["materials"], strict=True):
+        assert new.pop("occlusionTexture")["texCoord"] == 2
+        assert new == old
+    report = json.loads((tmp_path / "out" / "scene.report.json").read_text(encoding="utf-8"))
+    assert report["settings"]["padding"] == 2
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_one_uv_set_is_all_that_obj_holds(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--uv-set", "1", "--format", "obj"]
+    assert main(argv) == 2
+    assert "holds one set" in capsys.readouterr().err
+
+
+def test_any_uv_set_can_be_baked_onto(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["bake", str(scene), "-o", str(tmp_path / "out"), "--maps", "uv-checker", "--size", "64"]
+    assert main([*argv, "--uv-set", "0"]) == 0
+    assert "scene: 100 % of the faces overlap others in uv" in capsys.readouterr().err
+    assert main([*argv, "--uv-set", "0", "--strict"]) == 2
+    assert "overlap" in capsys.readouterr().err
+    assert main([*argv, "--uv-set", "1"]) == 2
+    assert "Board of scene has no uv set 1" in capsys.readouterr().err

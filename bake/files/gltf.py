@@ -98,7 +98,7 @@ def _check(atlas: Atlas, asset: Asset) -> None:
 
 def _add_mesh(document: gl.GLTF2, buffer: Buffer, atlas: Atlas, asset: Asset, material: gl.Material) -> None:
     """One primitive in one node in one scene."""
-    centre = _centre(atlas.positions)
+    centre = centre_of(atlas.positions)
     surface = material.pbrMetallicRoughness
     textured = surface is not None and surface.baseColorTexture is not None
     arrays = _vertex_arrays(atlas, asset, centre, textured=textured, tangents=material.normalTexture is not None)
@@ -113,7 +113,7 @@ def _add_mesh(document: gl.GLTF2, buffer: Buffer, atlas: Atlas, asset: Asset, ma
     document.scenes, document.scene = [gl.Scene(nodes=[0])], 0
 
 
-def _centre(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def centre_of(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) what to subtract before rounding to float32: zero where rounding alone is harmless."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     loss = np.abs(positions - positions.astype(np.float32)).max()
@@ -127,14 +127,14 @@ def _vertex_arrays(
     arrays: dict[str, NDArray[np.generic]] = {
         "POSITION": (atlas.positions - centre).astype(np.float32),
         "NORMAL": _unit_normals(atlas.normals),
-        "TEXCOORD_0": _flip_v(atlas.uv.astype(np.float64)),
+        "TEXCOORD_0": flip_v(atlas.uv.astype(np.float64)),
     }
     if asset.uv is not None:
-        arrays["TEXCOORD_1"] = _flip_v(asset.uv[atlas.source_vertex])
+        arrays["TEXCOORD_1"] = flip_v(asset.uv[atlas.source_vertex])
     if tangents:
         arrays["TANGENT"] = vertex_tangents(atlas)
     if asset.colors is not None:
-        arrays["_COLOR_0" if textured else "COLOR_0"] = _linear_shorts(asset.colors[atlas.source_vertex])
+        arrays["_COLOR_0" if textured else "COLOR_0"] = linear_shorts(asset.colors[atlas.source_vertex])
     return arrays
 
 
@@ -145,12 +145,12 @@ def _unit_normals(normals: NDArray[np.float32]) -> NDArray[np.float32]:
     return result.astype(np.float32)
 
 
-def _flip_v(uv: NDArray[np.float64]) -> NDArray[np.float32]:
+def flip_v(uv: NDArray[np.float64]) -> NDArray[np.float32]:
     """(n, 2) v up → v down, float32."""
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)
 
 
-def _linear_shorts(colors: NDArray[np.uint8]) -> NDArray[np.uint16]:
+def linear_shorts(colors: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """(n, 4) uint8 sRGB → normalized uint16 linear, as glTF wants vertex colours; 8 bits would band in the dark."""
     linear = linear_from_srgb(colors / 255.0)
     linear[:, 3] = colors[:, 3] / 255.0

@@ -18,7 +18,7 @@ from ...runtime.io.gltf.columns import Column, primitive_columns
 from ...runtime.io.gltf.editing import INDICES, Editing, save
 from ..maps.material import emissive_strength
 from ..maps.tangents import unit, vertex_tangents
-from .gltfrebaked import Baked, Materials
+from .gltfrebaked import SHADOWS, Baked, Materials
 from .images import encode_png
 from .targets import with_green
 
@@ -41,11 +41,16 @@ DRACO = "KHR_draco_mesh_compression"
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """An atlas with its textures, and the asset that it is of."""
+    """An atlas with its textures, and the asset that it is of.
+
+    uv_set: the set that its uv become while all others stay, and materials too but for their occlusion; None lets them
+    be the first, and the textures those of the materials.
+    """
 
     atlas: Atlas
     asset: Asset
     textures: Mapping[str, Texture]
+    uv_set: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,18 +93,15 @@ def write_scene(pages: list[Page], path: Path) -> None:
 
 def slices_of(page: Page, document: Document) -> Iterator[Slice]:
     """What the atlas has of each part of the document."""
-    atlas, origin = page.atlas, page.asset.origin
-    if origin is None:
-        raise ShapeError("the asset has no origin of its vertices, expected the rows of its document; pass it as read")
-    row = origin[atlas.source_vertex]
-    part_of = document.part_of(row)[atlas.faces[:, 0]]
-    for number in np.unique(part_of):
-        part = document.parts[int(number)]
-        own = part_of == number
+    atlas, asset = page.atlas, page.asset
+    if asset.part is None or asset.origin is None:
+        raise ShapeError("the asset does not know the parts of its document, expected them; pass it as it was read")
+    for number in np.unique(asset.part):
+        part, own = document.parts[int(number)], asset.part == number
         vertex, faces = np.unique(atlas.faces[own], return_inverse=True)
         faces = faces.reshape(-1, 3).astype(np.int64)
         faces = faces[:, [0, 2, 1]] if part.mirrored else faces
-        yield Slice(part, vertex, row[vertex] - part.start, faces, _unread(page.asset, int(np.argmax(own))))
+        yield Slice(part, vertex, asset.origin[atlas.source_vertex[vertex]], faces, _unread(asset, int(np.argmax(own))))
 
 
 def _unread(asset: Asset, face: int) -> frozenset[str]:
@@ -122,6 +124,8 @@ def _kept(tree: dict[str, Any], parts: list[Part]) -> frozenset[int]:
 def _embedded(editing: Editing, page: Page, name: str) -> Baked:
     """The textures of an atlas, embedded as 8-bit PNG with one sampler: trilinear, clamped to the edge."""
     shown = {name: page.textures[name] for name in SHOWN if name in page.textures}
+    if page.uv_set is not None:
+        shown = {name: shown[name] for name in SHADOWS if name in shown}
     numbers: dict[str, int] = {}
     if shown:
         sampler = {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": CLAMPED, "wrapT": CLAMPED}
@@ -129,6 +133,8 @@ def _embedded(editing: Editing, page: Page, name: str) -> Baked:
         for name, texture in shown.items():
             green = with_green(texture, "opengl") if name == "normal" else texture
             numbers[name] = editing.add_picture(name, encode_png(green, bits=8), number)
+    if page.uv_set is not None:
+        return Baked(name, numbers, coordinates=page.uv_set, moved=0)
     return Baked(name, numbers, strength=emissive_strength(page.asset) if "emissive" in numbers else 1.0)
 
 
@@ -170,7 +176,9 @@ def _new_columns(page: Page, piece: Slice, baked: Baked, rows: Mapping[str, Colu
     """uv, and the normals and tangents that the file lacks or that new uv change."""
     atlas = page.atlas
     uv = atlas.uv[piece.vertex].astype(np.float64)
-    found = {f"TEXCOORD_{baked.coordinates}": np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)}
+    flipped = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)
+    sets = (f"TEXCOORD_{number}" for number in range(baked.coordinates + 1))  # a set needs all those before it
+    found = {name: flipped for name in sets if name not in rows or name == f"TEXCOORD_{baked.coordinates}"}
     linear = piece.part.world[:3, :3]
     normals = unit(atlas.normals[piece.vertex].astype(np.float64) @ linear)  # the inverse of a normal's own matrix
     normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)

@@ -53,7 +53,8 @@ class Target:
     name: as on the command line.  green: of tangent-space normal maps.  pattern: file name without ending, of {stem}
     and {map}.  names: map → word in the file name; others keep theirs.  packed: word in the file name → the part in
     each channel.  bits: map → bits per channel where not the map's own.  texels_per_padding: padding = size / this, at
-    least 2: block-compressed textures need twice the usual.
+    least 2: block-compressed textures need twice the usual.  light_padding: of light maps, whatever their size; two
+    charts are twice that apart: 4 texels are Unity's pack margin and a block of Unreal's compressed light maps.
     """
 
     name: str
@@ -63,10 +64,11 @@ class Target:
     packed: Mapping[str, tuple[Part, ...]]
     bits: Mapping[str, Bits] = field(default_factory=dict)
     texels_per_padding: int = 256
+    light_padding: int = 2
 
-    def padding(self, size: int) -> int:
-        """Texels kept free around charts in an atlas of that size."""
-        return max(2, size // self.texels_per_padding)
+    def padding(self, size: int, *, light: bool = False) -> int:
+        """Texels kept free around charts in an atlas of that size.  light: for a light map."""
+        return self.light_padding if light else max(2, size // self.texels_per_padding)
 
     def file_names(self, maps: Sequence[str], stem: str) -> dict[str, str]:
         """Product → file name without ending, in the order of the maps, packed ones last; known before baking."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...runtime.mesh import Asset, Atlas
+    from ...runtime.mesh import Asset
 
 READ_BACK = 500_000
 """Faces up to which files are read back; of larger meshes the arrays that were serialized are judged."""
@@ -72,15 +72,16 @@ class Reading:
     most: int = READ_BACK
 
 
-def parts_of(atlas: Atlas, asset: Asset) -> tuple[NDArray[np.int64], list[PartUv]]:
-    """The order (f,) of the atlas' faces in a glTF file, part after part, and where the uv of each part lie in it."""
-    document, origin = asset.document, asset.origin
-    if document is None or origin is None:
-        return np.arange(len(atlas.faces)), [PartUv()]
-    part_of = document.part_of(origin[atlas.source_vertex[atlas.faces[:, 0]]])
-    parts = [document.parts[int(number)] for number in np.unique(part_of)]
-    places = [PartUv(part.mesh, part.primitive, mirrored=part.mirrored) for part in parts]
-    return np.argsort(part_of, kind="stable"), places
+def parts_of(asset: Asset, coordinates: int = 0) -> tuple[NDArray[np.int64], list[PartUv]]:
+    """The order (f,) of faces in a glTF file, part after part, and where the uv of each part lie in it.
+
+    coordinates: the set that the uv are.
+    """
+    if asset.document is None or asset.part is None:
+        return np.arange(len(asset.faces)), [PartUv(coordinates=coordinates)]
+    parts = [asset.document.parts[int(number)] for number in np.unique(asset.part)]
+    places = [PartUv(part.mesh, part.primitive, coordinates, part.mirrored) for part in parts]
+    return np.argsort(asset.part, kind="stable"), places
 
 
 def written_report(

@@ -72,3 +72,11 @@ def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
         return np.asarray(image.convert("RGBA"), dtype=np.uint8)
     except (OSError, ValueError, SyntaxError) as error:
         raise MeshError("a texture is damaged, expected a whole PNG or JPEG; remove it or save it as PNG") from error
+
+
+def png_of(pixels: NDArray[np.uint8]) -> bytes:
+    """The bytes of a PNG file of (h, w, 4) uint8, without alpha where all of it is 255."""
+    stream = io.BytesIO()
+    opaque = bool((pixels[..., 3] == 255).all())
+    Image.fromarray(np.ascontiguousarray(pixels[..., :3] if opaque else pixels)).save(stream, "PNG")
+    return stream.getvalue()

@@ -31,8 +31,9 @@ class RawMesh:
     positions: (n, 3) float64.  faces: (f, 3) int64 into positions.  normals: (n, 3) float64 or None.
     colors: (n, 4) uint8 sRGB or None.  uv: (n, 2) float64 v up, or None.
     face_material: (f,) int64 into materials, or None.  changes: what reading could not keep, name → count.
-    origin: (n,) int64, the row of the document that each vertex is, or None.  body: (n,) int64, the object that each
-    vertex belongs to; vertices of two bodies are never one.  document: the file that these triangles are part of.
+    document: the scene that these triangles are of.  part: (f,) int64, the part of it that each face is in.  origin:
+    (n,) int64, the vertex of that part that each vertex is.  body: (n,) int64, the object that each vertex belongs to;
+    vertices of two bodies are never one.
     """
 
     positions: NDArray[np.float64]
@@ -43,6 +44,7 @@ class RawMesh:
     materials: tuple[Material, ...] = ()
     face_material: NDArray[np.int64] | None = None
     changes: dict[str, int] = field(default_factory=dict)
+    part: NDArray[np.int64] | None = None
     origin: NDArray[np.int64] | None = None
     body: NDArray[np.int64] | None = None
     document: Document | None = None
@@ -154,6 +156,7 @@ def merge(parts: Sequence[RawMesh]) -> RawMesh:
         materials=materials,
         face_material=face_material,
         changes=changes,
+        part=_joined_numbers([part.part for part in parts]),
         origin=_joined_numbers([part.origin for part in parts]),
         body=_joined_numbers([part.body for part in parts]),
     )

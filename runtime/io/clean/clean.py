@@ -55,6 +55,7 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
         part,
         faces=_turned(part.faces[kept], flip),
         face_material=None if part.face_material is None else part.face_material[kept],
+        part=None if part.part is None else part.part[kept],
         changes={**part.changes, **counts},
     )
     return _asset(whole, _turned(sheets, flip), stem=stem, sha256=sha256)
@@ -97,6 +98,7 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         changes={name: count for name, count in counts.items() if count},
         sha256=sha256,
         stem=stem,
+        part=part.part,
         origin=part.origin,
         document=part.document,
     )

@@ -173,6 +173,11 @@ def stored_accessor(file: GltfFile, index: int) -> NDArray[Any]:
 
 def as_stored(file: GltfFile, index: int, values: NDArray[Any]) -> NDArray[Any]:
     """Numbers of an accessor as it means them: float64 where they are real or normalized, else as they are."""
-    if file.tree["accessors"][index].get("normalized") and values.dtype.kind in "iu":
+    return as_real(values, normalized=bool(file.tree["accessors"][index].get("normalized")))
+
+
+def as_real(values: NDArray[Any], *, normalized: bool) -> NDArray[Any]:
+    """Numbers as float64 where they are real or normalized, else as they are."""
+    if normalized and values.dtype.kind in "iu":
         return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
     return to_float64(values) if values.dtype.kind == "f" else values

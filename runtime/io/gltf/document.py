@@ -1,7 +1,6 @@
-"""A glTF document beside the surface that is read of it: which row of which primitive each vertex of the mesh is.
+"""A glTF document beside the surface that is read of it.   A part is one primitive of triangles.
 
-Rows number the vertices of all parts, one part after the other; a part is one primitive of triangles.  Words of the
-specification (Khronos, glTF 2.0.1): mesh, primitive, node, accessor.
+Words of the specification (Khronos, glTF 2.0.1): mesh, primitive, node.
 """
 
 from __future__ import annotations
@@ -25,13 +24,11 @@ LIGHTS = "KHR_lights_punctual"
 class Part:
     """One primitive.
 
-    mesh, primitive: its numbers.  start, count: its rows.  world: (4, 4) float64, its own space → that of the asset.
+    mesh, primitive: its numbers.  world: (4, 4) float64, its own space → that of the asset.
     """
 
     mesh: int
     primitive: int
-    start: int
-    count: int
     world: NDArray[np.float64]
 
     @property
@@ -47,10 +44,6 @@ class Document:
     file: GltfFile
     parts: tuple[Part, ...]
     placements: tuple[Placement, ...]
-
-    def part_of(self, row: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Part of each row (m,) int64."""
-        return np.searchsorted([part.start for part in self.parts], row, side="right") - 1
 
     def beyond_meshes(self) -> dict[str, int]:
         """What a still mesh can't say: instances, animations, skins, morph targets, cameras and lights of the file."""

@@ -22,12 +22,10 @@ def every_instance(atlas: Atlas, asset: Asset) -> tuple[Atlas, NDArray[np.int64]
 
     Faces of an instance that mirrors are turned, so that outside stays outside.
     """
-    document, origin = asset.document, asset.origin
-    same = np.arange(len(atlas.faces))
-    if document is None or origin is None:
+    document, same = asset.document, np.arange(len(atlas.faces))
+    if document is None or asset.part is None:
         return atlas, same
-    part_of = document.part_of(origin[atlas.source_vertex[atlas.faces[:, 0]]])
-    mesh_of = np.array([part.mesh for part in document.parts])[part_of]
+    mesh_of = np.array([part.mesh for part in document.parts])[asset.part]
     world = {part.mesh: part.world for part in document.parts}
     placements = standing(document.placements, set(world))
     if len(placements) == len(world) and all(entry.world is world[entry.mesh] for entry in placements):

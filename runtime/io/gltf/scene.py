@@ -80,19 +80,17 @@ def _scene(file: GltfFile, *, instances: bool) -> RawMesh:
     materials, changes = read_materials(file)
     placements = placed_meshes(file)
     chosen = [entry for entry in placements if entry.first] if instances else best_placements(placements)
-    found, parts, skipped, rows, faces = [], [], 0, 0, 0
+    found, parts, skipped, faces = [], [], 0, 0
     for placement in chosen:
         for number, primitive in enumerate(file.tree["meshes"][placement.mesh]["primitives"]):
             if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
                 skipped += 1
                 continue
             raw = _primitive(file, primitive, materials)
-            count = len(raw.positions)
-            body = np.full(count, placement.mesh, dtype=np.int64)
-            raw = replace(raw, origin=rows + np.arange(count), body=None if instances else body)
+            raw = raw if instances else _numbered(raw, len(parts), placement.mesh)
             found.append(transformed(raw, placement.world))
-            parts.append(Part(placement.mesh, number, rows, count, placement.world))
-            rows, faces = rows + count, faces + len(raw.faces)
+            parts.append(Part(placement.mesh, number, placement.world))
+            faces += len(raw.faces)
             if faces > MAX_FACES:
                 raise MeshError(f"the glTF scene has over {MAX_FACES} faces; decimate the meshes or split the scene")
     if not found:
@@ -102,6 +100,14 @@ def _scene(file: GltfFile, *, instances: bool) -> RawMesh:
     if instances:
         return replace(whole, changes={**whole.changes, **changes, "skipped_primitives": skipped})
     return replace(whole, document=Document(file, tuple(parts), tuple(placements)), changes=changes)
+
+
+def _numbered(raw: RawMesh, part: int, mesh: int) -> RawMesh:
+    """The triangles as those of a part; vertices of different meshes stay apart."""
+    count = len(raw.positions)
+    return replace(
+        raw, part=np.full(len(raw.faces), part), origin=np.arange(count), body=np.full(count, mesh, dtype=np.int64)
+    )
 
 
 def _primitive(file: GltfFile, primitive: dict[str, Any], materials: Sequence[Material]) -> RawMesh:
