@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.geometry.topology import boundary_loops, euler_characteristic, is_manifold
-from flexpara.runtime.geometry.triangles import corner_angles
+from flexpara.runtime.geometry.triangles import corner_angles, edge_lengths
 from flexpara.runtime.io.points.cloud import CloudMesh, PointCloud, cloud_from_arrays, point_uv
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.pack.packing import pack
@@ -62,10 +62,17 @@ def unwrapped(cloud: PointCloud, settings: TrainConfig = QUICK) -> tuple[CloudMe
 
 
 def conformality(points: np.ndarray, faces: np.ndarray, uv: np.ndarray, chart: np.ndarray) -> float:
-    """Mean |angle on the surface − angle in uv| over true triangles inside one chart, of which there must be many."""
+    """Mean |angle on the surface − angle in uv| over true triangles inside one chart, of which there must be many.
+
+    A point on a slit has the uv of one of its sides, so a triangle on the other side is torn: one of its edges is more
+    than twice as long as the scale of the layout makes it.  Torn triangles are not inside either.
+    """
+    flat = uv.astype(np.float64)[faces]
+    stretch = (edge_lengths(flat) / edge_lengths(points[faces])).max(axis=1)
     inside = (chart[faces] == chart[faces][:, :1]).all(axis=1)
+    inside &= stretch < 2.0 * np.median(stretch[inside])
     assert inside.mean() > 0.7
-    return float(np.abs(corner_angles(points[faces]) - corner_angles(uv.astype(np.float64)[faces]))[inside].mean())
+    return float(np.abs(corner_angles(points[faces]) - corner_angles(flat))[inside].mean())
 
 
 def check_valid(mesh: CloudMesh, atlas: Atlas, uv: np.ndarray, chart: np.ndarray) -> None:
@@ -207,12 +214,10 @@ def test_a_sphere_of_points_is_unwrapped_nearly_conformally() -> None:
     hull = ConvexHull(points).simplices.astype(np.int64)  # the Delaunay triangulation of a sphere
     ours, true = (set(map(tuple, np.sort(faces).tolist())) for faces in (mesh.asset.faces, hull))
     assert len(ours & true) >= 0.99 * len(true)
-    assert conformality(points, hull, uv, chart) < 0.13  # one slit ball: its areas are kept better than its angles
+    assert conformality(points, hull, uv, chart) < 0.06  # measured: 0.030
 
 
-@pytest.mark.parametrize(
-    ("name", "most"), [("torus", 0.13), ("trefoil", 0.15)]
-)  # in one or two charts; the knot has eight points around it
+@pytest.mark.parametrize(("name", "most"), [("torus", 0.06), ("trefoil", 0.06)])  # measured: 0.024 and 0.033
 def test_points_of_a_closed_tube_are_unwrapped_nearly_conformally(name: str, most: float) -> None:
     vertices, faces = make_sample(name, resolution=48)
     order = np.random.default_rng(16).permutation(len(vertices))

@@ -226,11 +226,11 @@ def test_a_slit_pays_where_it_saves_more_than_it_costs(price: float, pays: bool)
 def test_a_cone_is_slit_to_its_apex_and_becomes_flat() -> None:
     flat = flattened(sample("cone", 32))
     assert excess(flat) > 0.1
-    open_, slits = slit_further(flat)
+    open_, slits = slit_further(flat, replace(CONFIG, contact=replace(CONFIG.contact, block=5, still=0.04)))
     assert len(slits) == 1
     assert slits[0].points[-1] == pytest.approx(APEX, abs=0.1)
     assert slits[0].points[0][2] == 0.0
-    assert excess(open_) < 5e-3
+    assert excess(open_) < 1e-4  # a search, which has less patience, leaves 0.0019
     assert_valid(open_)
 
 
