@@ -189,8 +189,6 @@ class FinishConfig:
     """Charts of most energy that are tried for a split where the stretch is out of bounds."""
     halvings: int = 8
     """Times faces that can't be flattened are halved before xatlas gets them."""
-    necks: int = 2
-    """Borders tried for each split and seed."""
     shared: float = 0.1
     """Share of the smaller border that two pieces must share to be worth a merge."""
     small: float = 0.03

@@ -48,7 +48,7 @@ class HighSource:
     def __init__(
         self, highs: Sequence[Asset], settings: CageSettings | None = None, *, progress: Progress | None = None
     ) -> None:
-        """Prepare.  highs, settings, progress: as for `bake_from_high`."""
+        """Prepare.  highs, settings: see `Projector.of`.  progress: called as progress(done, total), in texels."""
         if not highs:
             raise InputError("no high-poly mesh: expected one or more; pass --high high.obj")
         self._reports: dict[tuple[int, int], dict[str, float]] = {}
@@ -57,7 +57,7 @@ class HighSource:
         self._found = lru_cache(maxsize=1)(self._find)
 
     def surface(self, gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> HighSurface:
-        """The high-poly surface under a G-buffer of the low-poly atlas.  Raises as `bake_from_high`."""
+        """The high-poly surface under a G-buffer of the low-poly atlas.  Raises as `Projector.of`."""
         return self._found(gbuffer, atlas, asset)
 
     def outputs(self, outputs: Outputs) -> Outputs:

@@ -70,30 +70,6 @@ class HighSurface:
         }
 
 
-def bake_from_high(
-    gbuffer: GBuffer,
-    atlas: Atlas,
-    asset: Asset,
-    highs: Sequence[Asset],
-    settings: CageSettings | None = None,
-    *,
-    progress: Progress | None = None,
-) -> HighSurface:
-    """Find the high-poly surface under each texel.
-
-    Args:
-        gbuffer: of the low-poly atlas, or a window of it.
-        atlas: the low-poly atlas.
-        asset: the low-poly mesh; its faces are those of the atlas.
-        highs: the high-poly meshes, one or more, in the low-poly's coordinates.
-        settings: how far rays reach, from where, and what they see.
-        progress: called as progress(done, total), in texels of a part.
-
-    Raises: InputError without a high-poly mesh, for a cage of another topology, for parts without partners.
-    """
-    return Projector.of(atlas, asset, highs, settings).surface(gbuffer, progress)
-
-
 @dataclass(frozen=True, eq=False)
 class Projector:
     """Low-poly and high-poly meshes ready for rays, for one G-buffer after another.
@@ -112,7 +88,16 @@ class Projector:
 
     @classmethod
     def of(cls, atlas: Atlas, asset: Asset, highs: Sequence[Asset], settings: CageSettings | None = None) -> Projector:
-        """Prepare.  Arguments and errors as `bake_from_high`."""
+        """Prepare.
+
+        Args:
+            atlas: the low-poly atlas.
+            asset: the low-poly mesh; its faces are those of the atlas.
+            highs: the high-poly meshes, one or more, in the low-poly's coordinates.
+            settings: how far rays reach, from where, and what they see.
+
+        Raises: InputError without a high-poly mesh, for a cage of another topology, for parts without partners.
+        """
         if not highs:
             raise InputError("no high-poly mesh: expected one or more; pass --high high.obj")
         settings = settings or CageSettings()

@@ -12,16 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import onnxruntime
-from onnxruntime.capi.onnxruntime_pybind11_state import (
-    Fail,
-    InvalidArgument,
-    InvalidGraph,
-    InvalidProtobuf,
-    RuntimeException,
-)
-from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNotImplemented
 
 from ...runtime.errors import InputError, MissingFileError, ShapeError
+from ...runtime.sessions.modelerrors import MODEL_ERRORS
 from ..bakemap import BakeMap
 
 if TYPE_CHECKING:
@@ -35,7 +28,6 @@ MAX_BYTES = 1 << 30
 CHUNK = 16_384
 """Points a run: bounds the memory of what the graph makes of them."""
 CHANNELS = (1, 2, 3, 4)
-_ERRORS = (Fail, InvalidArgument, InvalidGraph, InvalidProtobuf, OrtNotImplemented, RuntimeException)
 _EXPECTED = "expected an ONNX graph of one input points float32 (n, 3) and one output float32 (n, 1 to 4)"
 _REMEDY = "export the field anew with these names and a dynamic n"
 
@@ -56,7 +48,7 @@ class FieldSession:
         options.log_severity_level = 4
         try:
             self._session = onnxruntime.InferenceSession(self.path, options, providers=["CPUExecutionProvider"])
-        except _ERRORS as error:
+        except MODEL_ERRORS as error:
             reason = str(error).splitlines()[0][:200]
             raise InputError(f"{path}: no usable ONNX model ({reason}), {_EXPECTED}; {_REMEDY}") from error
         self.output = _checked_signature(self._session, self.path)
@@ -77,7 +69,7 @@ class FieldSession:
         """One chunk."""
         try:
             (answer,) = self._session.run([self.output], {"points": points})
-        except _ERRORS as error:
+        except MODEL_ERRORS as error:
             reason = str(error).splitlines()[0][:200]
             raise InputError(f"{self.path}: the graph failed on {len(points)} points ({reason}); {_REMEDY}") from error
         values = np.asarray(answer)

@@ -145,17 +145,6 @@ def face_distortion(surface: Surface, corner_uv: NDArray[np.float64]) -> NDArray
     return energy
 
 
-def chart_distortion(
-    surface: Surface, corner_uv: NDArray[np.float64], face_chart: NDArray[np.int64]
-) -> list[dict[str, float]]:
-    """Per chart: faces, share of the surface area, area-weighted symmetric Dirichlet mean (globally normalized)."""
-    energy, area = face_distortion(surface, corner_uv), surface.face_areas()
-    faces, total = np.bincount(face_chart), np.bincount(face_chart, area)
-    mean = np.bincount(face_chart, area * energy) / np.maximum(total, np.finfo(np.float64).tiny)
-    rows = zip(faces.tolist(), (total / area.sum()).tolist(), mean.tolist(), strict=True)
-    return [{"faces": n, "area_share": share, "symmetric_dirichlet_mean": value} for n, share, value in rows]
-
-
 def uv_charts(
     faces: NDArray[np.int64], corner_uv: NDArray[np.float64], table: EdgeTable | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -14,18 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
-from onnxruntime.capi.onnxruntime_pybind11_state import (
-    Fail,
-    InvalidArgument,
-    InvalidGraph,
-    InvalidProtobuf,
-    RuntimeException,
-)
-from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as OrtNotImplemented
 
 from ..errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from .bundle import METADATA_KEY, BundleMetadata
 from .chunks import checked_chunk, checked_threads, fill_in_chunks
+from .modelerrors import MODEL_ERRORS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -39,7 +32,6 @@ FAR = 1e6
 
 Points = NDArray[np.float32] | NDArray[np.float64] | NDArray[np.float32 | np.float64]
 
-_ONNX_ERRORS = (Fail, InvalidArgument, InvalidGraph, InvalidProtobuf, OrtNotImplemented, RuntimeException)
 _REMEDY = "pass the .onnx file that flexpara unwrap wrote"
 
 
@@ -72,7 +64,7 @@ class Opened(NamedTuple):
         """The outputs, every number finite.  Raises: BundleError where a damaged model can't answer so."""
         try:
             found = [np.asarray(output) for output in self.session.run(list(outputs), dict(feed))]
-        except _ONNX_ERRORS as error:
+        except MODEL_ERRORS as error:
             raise BundleError(
                 f"{self.path}: the model does not run, expected an answer; the file is damaged: {_REMEDY}"
             ) from error
@@ -211,7 +203,7 @@ def _load(
         options.add_initializer(name, value)
     try:
         return onnxruntime.InferenceSession(path, options, providers=list(providers), enable_fallback=0)
-    except (*_ONNX_ERRORS, UnicodeDecodeError) as error:
+    except (*MODEL_ERRORS, UnicodeDecodeError) as error:
         raise BundleError(f"{path}: no usable ONNX model, expected an exported file; {_REMEDY}") from error
 
 

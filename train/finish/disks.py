@@ -11,7 +11,7 @@ import numpy as np
 
 from ...runtime.geometry.cutgraph import ShortestPaths as ShortestPaths
 from ...runtime.geometry.cutgraph import closing_paths, edge_costs, path_mask, prune, shortest_paths, trace_back
-from ...runtime.geometry.topology import EdgeTable, edge_table, split_non_manifold_vertices
+from ...runtime.geometry.topology import EdgeTable, split_non_manifold_vertices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,9 +58,3 @@ def cut_open(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Faces (f, 3) over the vertices of the opened piece, and the old vertex (v',) of each."""
     return split_non_manifold_vertices(faces, cut, table)
-
-
-def is_disk(faces: NDArray[np.int64]) -> bool:
-    """True for V − E + F = 1: with one component and a manifold, a disk."""
-    table = edge_table(faces)
-    return len(np.unique(faces)) - len(table.edges) + len(faces) == 1

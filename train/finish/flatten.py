@@ -13,7 +13,6 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from ...runtime.geometry import triangles
-from ...runtime.geometry.distortion import oriented_energy
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import boundary_loops
 from ...runtime.mesh import Surface
@@ -33,12 +32,6 @@ class Pins(NamedTuple):
 def jacobians(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
     """(f, 2, 2) derivative of uv in an orthonormal basis of each face, for uv (v, 2)."""
     return triangles.jacobians(surface.triangles, uv[surface.faces])
-
-
-def mean_distortion(surface: Surface, uv: NDArray[np.float64]) -> float:
-    """Area-weighted mean symmetric Dirichlet energy of a piece."""
-    areas = surface.face_areas()
-    return float(oriented_energy(jacobians(surface, uv)) @ areas / areas.sum())
 
 
 def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]:

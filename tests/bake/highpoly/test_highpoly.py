@@ -11,7 +11,7 @@ import pytest
 
 from flexpara.bake.highpoly.cage import CageSettings, Rays
 from flexpara.bake.highpoly.highmesh import atlas_of, merge_assets, uv_per_unit
-from flexpara.bake.highpoly.highpoly import bake_from_high, first_front
+from flexpara.bake.highpoly.highpoly import HighSurface, Projector, first_front
 from flexpara.bake.maps.rays import RayScene
 from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.runtime.errors import InputError
@@ -33,6 +33,12 @@ def plane(height: float, *, slope: float = 0.0, up: bool = True, low: float = -1
     return Asset(corners, faces, np.arange(4), Surface(corners, faces), stem="plane")
 
 
+def seen_by(
+    buffer: GBuffer, atlas: Atlas, asset: Asset, highs: list[Asset], settings: CageSettings | None = None
+) -> HighSurface:
+    return Projector.of(atlas, asset, highs, settings).surface(buffer, None)
+
+
 def down_rays(points: list[list[float]], front: float, back: float) -> Rays:
     point = np.array(points, np.float32)
     count = len(point)
@@ -44,7 +50,7 @@ def down_rays(points: list[list[float]], front: float, back: float) -> Rays:
 def test_a_plane_above_or_below_is_found_where_it_is(make_gbuffer: MakeGBuffer, quad: Pair, height: float) -> None:
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 16)
-    found = bake_from_high(buffer, atlas, asset, [plane(height)], CageSettings(0.1))
+    found = seen_by(buffer, atlas, asset, [plane(height)], CageSettings(0.1))
     np.testing.assert_allclose(found.height, height, atol=1e-6)
     np.testing.assert_allclose(found.gbuffer.position, buffer.position + np.array([0, 0, height]), atol=1e-6)
     np.testing.assert_allclose(found.gbuffer.normal, np.broadcast_to([0, 0, 1], (16, 16, 3)), atol=1e-6)
@@ -56,7 +62,7 @@ def test_the_outermost_front_is_taken(make_gbuffer: MakeGBuffer, quad: Pair) -> 
     """Of details that float above the surface, what lies on top."""
     atlas, asset = quad
     highs = [plane(0.0), plane(0.05), plane(0.5)]
-    found = bake_from_high(make_gbuffer(atlas, 8), atlas, asset, highs, CageSettings(0.1))
+    found = seen_by(make_gbuffer(atlas, 8), atlas, asset, highs, CageSettings(0.1))
     np.testing.assert_allclose(found.height, 0.05, atol=1e-6)
     assert set(found.gbuffer.face.reshape(-1)) <= {2, 3}  # those of the second mesh
 
@@ -65,9 +71,9 @@ def test_backs_are_passed_unless_they_count(make_gbuffer: MakeGBuffer, quad: Pai
     atlas, asset = quad
     buffer = make_gbuffer(atlas, 8)
     highs = [plane(0.08, up=False), plane(0.05, up=False), plane(-0.02)]
-    found = bake_from_high(buffer, atlas, asset, highs, CageSettings(0.1))
+    found = seen_by(buffer, atlas, asset, highs, CageSettings(0.1))
     np.testing.assert_allclose(found.height, -0.02, atol=1e-6)
-    counted = bake_from_high(buffer, atlas, asset, highs, CageSettings(0.1, ignore_backs=False))
+    counted = seen_by(buffer, atlas, asset, highs, CageSettings(0.1, ignore_backs=False))
     np.testing.assert_allclose(counted.height, 0.08, atol=1e-6)
 
 
@@ -94,7 +100,7 @@ def test_missed_texels_take_the_nearest_point_and_are_counted(make_gbuffer: Make
     half = plane(0.0, low=-1.0, high=0.5)
     moved = half.positions + np.array([0, 0.5, 0])
     half = replace(half, positions=moved, surface=Surface(moved, half.faces))
-    found = bake_from_high(buffer, atlas, asset, [half])
+    found = seen_by(buffer, atlas, asset, [half])
     assert found.missed[:, 8:].all()
     assert not found.missed[:, :8].any()
     np.testing.assert_allclose(found.gbuffer.position[:, 8:, 0], 0.5, atol=1e-6)
@@ -105,7 +111,7 @@ def test_missed_texels_take_the_nearest_point_and_are_counted(make_gbuffer: Make
 def test_texels_without_surface_stay_without(make_gbuffer: MakeGBuffer, two_charts: Pair) -> None:
     atlas, asset = two_charts
     buffer = make_gbuffer(atlas, 32)
-    found = bake_from_high(buffer, atlas, asset, [plane(0.0)], CageSettings(1.0))
+    found = seen_by(buffer, atlas, asset, [plane(0.0)], CageSettings(1.0))
     np.testing.assert_array_equal(found.gbuffer.face < 0, buffer.face < 0)
     np.testing.assert_array_equal(found.gbuffer.texels, buffer.texels)
     assert (found.height[buffer.face < 0] == 0).all()
@@ -117,7 +123,7 @@ def test_a_ball_around_a_coarse_ball(make_gbuffer: MakeGBuffer, sphere: Pair) ->
     vertices, faces = make_sample("sphere", resolution=96)
     high = asset_from_arrays(vertices * 1.05, faces)
     buffer = make_gbuffer(atlas, 64)
-    found = bake_from_high(buffer, atlas, asset, [high], CageSettings(0.05))
+    found = seen_by(buffer, atlas, asset, [high], CageSettings(0.05))
     position = found.gbuffer.position.reshape(-1, 3)[buffer.texels]
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 1.05, atol=2e-3)
     normal = found.gbuffer.normal.reshape(-1, 3)[buffer.texels]
@@ -134,17 +140,17 @@ def test_parts_see_only_their_partners(make_gbuffer: MakeGBuffer, two_charts: Pa
     low = replace(asset, materials=(Material("a_low"), Material("b_low")), face_material=np.array([0, 0, 1, 1]))
     highs = [replace(plane(0.9), stem="a_high"), replace(plane(0.2), stem="b_high")]
     buffer = make_gbuffer(atlas, 32)
-    found = bake_from_high(buffer, atlas, low, highs, CageSettings(1.0, match_names=True))
+    found = seen_by(buffer, atlas, low, highs, CageSettings(1.0, match_names=True))
     np.testing.assert_allclose(found.height[buffer.face // 2 == 0], 0.9, atol=1e-5)
     np.testing.assert_allclose(found.height[buffer.face // 2 == 1], -0.8, atol=1e-5)
     assert set(found.gbuffer.face[buffer.face // 2 == 1]) <= {2, 3}
     with pytest.raises(InputError, match="named like b"):
-        bake_from_high(buffer, atlas, low, highs[:1], CageSettings(1.0, match_names=True))
+        seen_by(buffer, atlas, low, highs[:1], CageSettings(1.0, match_names=True))
 
 
 def test_no_high_poly_mesh_is_refused(make_gbuffer: MakeGBuffer, quad: Pair) -> None:
     with pytest.raises(InputError, match="pass --high"):
-        bake_from_high(make_gbuffer(quad[0], 8), *quad, [])
+        seen_by(make_gbuffer(quad[0], 8), *quad, [])
 
 
 def test_merged_meshes_keep_faces_normals_and_materials() -> None:
@@ -183,7 +189,7 @@ def test_a_mesh_baked_onto_itself_finds_itself(make_gbuffer: MakeGBuffer, models
     spot = replace(spot, uv=spot.uv * 0.9 + 0.06)
     atlas = atlas_from_uv(spot)
     buffer = make_gbuffer(atlas, 256)
-    found = bake_from_high(buffer, atlas, spot, [spot], CageSettings(0.001))
+    found = seen_by(buffer, atlas, spot, [spot], CageSettings(0.001))
     covered = buffer.face >= 0
     assert found.missed.mean() < 1e-3
     diagonal = float(np.linalg.norm(np.ptp(spot.positions, axis=0)))
@@ -208,7 +214,7 @@ def coarse_bunny(models: Path, pair: Callable[..., Pair]) -> tuple[Pair, Asset]:
 
 def test_a_box_around_bunny_sees_all_of_its_sides(make_gbuffer: MakeGBuffer, coarse_bunny: tuple[Pair, Asset]) -> None:
     (atlas, asset), high = coarse_bunny
-    found = bake_from_high(make_gbuffer(atlas, 192), atlas, asset, [high], CageSettings(0.5))
+    found = seen_by(make_gbuffer(atlas, 192), atlas, asset, [high], CageSettings(0.5))
     texels = found.gbuffer.texels
     assert found.report()["missed_share"] < 0.05
     hit = ~found.missed.reshape(-1)[texels]

@@ -19,7 +19,7 @@ from flexpara.runtime.geometry.topology import (
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.finish.disks import cut_open, disk_cuts, is_disk
+from flexpara.train.finish.disks import cut_open, disk_cuts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,11 +70,6 @@ def assert_disk(surface: Surface) -> None:
     assert components(surface.faces).max() == 0
     assert len(boundary_loops(surface.faces)) == 1
     assert is_manifold(surface.faces)
-
-
-def test_a_triangle_is_a_disk_and_a_tetrahedron_is_not() -> None:
-    assert is_disk(TRIANGLE)
-    assert not is_disk(TETRAHEDRON.faces)
 
 
 def test_one_triangle_needs_no_cut() -> None:
