@@ -120,6 +120,34 @@ class CarryConfig:
 
 
 @dataclass(frozen=True)
+class FineConfig:
+    """A part of many faces: thinned to a middle mesh for all but the last step, which carries its charts back."""
+
+    faces: int = 20000
+    """Faces of the middle mesh."""
+    above: float = 1.5
+    """Parts of more than so many times as many are thinned."""
+    early: int = 3
+    """The quick thinning ends at so many times the faces wanted; the careful one does the rest."""
+    haste: float = 3.0
+    """How fast the threshold of the quick thinning rises: 7 is its library's default, 0 the most careful."""
+    jitter: float = 0.03
+    """Standard deviation of its vertices' moves, as a share of the shortest edge at each."""
+    steps: int = 4
+    """Rigid steps after the first solve, which keeps the middle chart's own stretch."""
+    steepest: float = 2.0
+    """Stretch of a face of the middle mesh that is taken over; a sliver's may be anything."""
+    contacts: int = 2
+    """Steps more, in which what came to overlap is held where it was …"""
+    hold: float = 1e3
+    """… by this weight against the distortion energy."""
+    tolerance: float = 1e-3
+    """Residual, as a share of the right side, at which a solve ends."""
+    solver_steps: int = 200
+    """The most steps of conjugate gradients of a solve."""
+
+
+@dataclass(frozen=True)
 class SplitConfig:
     """Where a chart may be cut in two: along isolines of the distance from a seed."""
 
@@ -159,6 +187,8 @@ class FinishConfig:
     """Handles that a first cluster may have: a part with more starts from more clusters than charts were asked for."""
     carry: CarryConfig = field(default_factory=CarryConfig)
     """From the simplified twin back to the surface."""
+    fine: FineConfig = field(default_factory=FineConfig)
+    """Parts of many faces."""
     split: SplitConfig = field(default_factory=SplitConfig)
     """Where a chart may be cut in two."""
     foretold: float = 0.4

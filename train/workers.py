@@ -15,6 +15,8 @@ import sys
 import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+from threadpoolctl import threadpool_limits
+
 from ..runtime.errors import FinishError
 
 if TYPE_CHECKING:
@@ -30,6 +32,14 @@ MOST = 16384
 
 _sharing: list[bool] = []
 """Not empty while work is shared: what is shared out shares nothing itself, or copies would make copies."""
+
+
+def one_thread_each() -> threadpool_limits:
+    """Within this, a process multiplies matrices with one thread: copies share the cores, and sums have one order.
+
+    OpenBLAS' threads wait for each other in a loop: two copies with two each take twice the time of two with one.
+    """
+    return threadpool_limits(1, user_api="blas")
 
 
 class Copy(NamedTuple):

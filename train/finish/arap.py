@@ -16,9 +16,15 @@ from .curvature import factorize
 from .flatten import jacobians
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
+    from .flatten import Pins
+
+    Solve = Callable[[NDArray[np.float64], NDArray[np.float64] | None, float], NDArray[np.float64]]
+    """Right sides (v, 2), where to start from, and the size that a residual is a share of → unknowns (v, 2)."""
 
 PIN = 1e-6
 """Weight that holds one vertex in place, as a share of the mean diagonal: the energy leaves the whole's place open.
@@ -26,28 +32,51 @@ PIN = 1e-6
 No setting: any weight gives the same shape, as the pinned vertex gets there at no cost to the rest."""
 
 
+def factorized(matrix: sparse.csr_array) -> Solve:
+    """Solves by factors of the matrix; where a solve starts from plays no part."""
+    solver = factorize(matrix)
+    return lambda right, _start, _size: solver.solve(np.ascontiguousarray(right))
+
+
 class RigidSteps:
     """The local and global steps for one piece."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(
+        self,
+        surface: Surface,
+        solver: Callable[[sparse.csr_array], Solve] = factorized,
+        pins: Pins | None = None,
+    ) -> None:
+        """``solver``: of the one matrix of all steps.  ``pins`` draw their vertices to their places."""
         self.surface = surface
         self.areas = surface.face_areas()
         self.gradient = gradient(surface)
         weight = np.r_[self.areas, self.areas]
         matrix = (self.gradient.T @ sparse.diags_array(weight) @ self.gradient).tocsr()
-        pin = sparse.coo_array(([PIN * matrix.diagonal().mean()], ([0], [0])), shape=matrix.shape)
-        self.solver = factorize((matrix + pin).tocsr())
+        held = np.zeros(len(surface.vertices))
+        held[0] = PIN * matrix.diagonal().mean()
+        self.pull = np.zeros((len(surface.vertices), 2))
+        if pins is not None:
+            held[pins.vertex] += pins.weight
+            self.pull[pins.vertex] = pins.weight * pins.place
+        self.system = solver((matrix + sparse.diags_array(held)).tocsr())
 
-    def solve(self, turn: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Uv (v, 2) whose Jacobians are nearest to rotations turn (f, 2, 2), weighted by area."""
+    def solve(self, turn: NDArray[np.float64], start: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Uv (v, 2) whose Jacobians are nearest to turn (f, 2, 2), rotations mostly, weighted by area.
+
+        ``start`` (v, 2): where a solver that needs steps begins.
+        """
         target = np.concatenate([turn[:, :, 0], turn[:, :, 1]]) * np.r_[self.areas, self.areas][:, None]
-        return self.solver.solve(np.ascontiguousarray(self.gradient.T @ target))
+        right = self.gradient.T @ target
+        return self.system(right + self.pull, start, float(np.linalg.norm(right)))
 
-    def run(self, turn: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+    def run(
+        self, turn: NDArray[np.float64], steps: int, start: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
         """Uv (v, 2) after ``steps`` from rotations turn (f, 2, 2)."""
-        uv = self.solve(turn)
+        uv = self.solve(turn, start)
         for _ in range(steps - 1):
-            uv = self.solve(nearest_rotations(jacobians(self.surface, uv)))
+            uv = self.solve(nearest_rotations(jacobians(self.surface, uv)), uv)
         return uv
 
 

@@ -14,11 +14,15 @@ import numpy as np
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.overlap import overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table
-from .flatten import ISOMETRIC, Pins, Slim, jacobians, slim
+from .flatten import Pins, Slim, jacobians, slim
 
 if TYPE_CHECKING:
-    import igl
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
+
+    Move = Callable[[NDArray[np.float64], Pins | None], NDArray[np.float64]]
+    """Uv (v, 2) and pins → uv (v, 2) without flips that gives way to the pins."""
 
     from ...runtime.mesh import Surface
     from .config import ContactConfig
@@ -111,9 +115,13 @@ def separate(
     start: Relaxed,
     edges: NDArray[np.int64],
     config: ContactConfig,
-    energy: igl.MappingEnergyType = ISOMETRIC,
+    move: Move | None = None,
 ) -> Relaxed | None:
-    """``start`` with its overlaps taken apart; None where ``config.rounds`` did not suffice."""
+    """``start`` with its overlaps taken apart; None where ``config.rounds`` did not suffice.
+
+    ``move``: how the piece gives way to pins; None: by isometric SLIM.
+    """
+    move = move or (lambda uv, pins: slim(surface, uv, config.iterations, pins))
     margin = config.margin * float(np.sqrt(surface.face_areas().sum()))
     uv, places = start.uv, dict(start.pins)
     for _ in range(config.rounds):
@@ -124,7 +132,7 @@ def separate(
         if len(buried) == 0 or len(buried) > config.most * len(edges):
             return None
         places.update(zip(buried.tolist(), nearest_exit(uv, buried, edges, margin), strict=True))
-        uv = slim(surface, uv, config.iterations, as_pins(places, config.weight), energy)
+        uv = move(uv, as_pins(places, config.weight))
     return None if rim_overlaps(surface.faces, edges, uv) else Relaxed(uv, places)
 
 

@@ -6,6 +6,7 @@ Valid means: no flipped triangle, and a border that doesn't cross itself.  uv (v
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from ...runtime.mesh import Surface
     from ..finish.config import ContactConfig
+    from ..finish.flatten import Pins
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def conformal_contacts(
         if angle_error(disk, best) < config.enough:
             break
         moved = slim(disk, state.uv, 1, as_pins(state.pins, contact.weight), CONFORMAL)
-        apart = separate(disk, Relaxed(moved, state.pins), edges, contact, CONFORMAL)
+        apart = separate(disk, Relaxed(moved, state.pins), edges, contact, partial(conformal_step, disk, contact))
         if apart is None:
             break
         state, uv = apart, at_scale_of(disk, apart.uv)
@@ -78,6 +80,13 @@ def conformal_contacts(
             break
         best = uv
     return best
+
+
+def conformal_step(
+    disk: Surface, contact: ContactConfig, uv: NDArray[np.float64], pins: Pins | None
+) -> NDArray[np.float64]:
+    """The uv (v, 2) after conformal SLIM that gives way to pins."""
+    return slim(disk, uv, contact.iterations, pins, CONFORMAL)
 
 
 def highest_energy(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> float:

@@ -29,8 +29,9 @@ from ..finish.disks import cut_open
 from ..finish.flatten import circle_map
 from ..finish.pieces import Piece, border_length
 from ..finish.slits import Flat, Slit, slit_along, slit_where_it_pays
-from ..search.charts import Finished, verify
+from ..search.charts import Finished
 from ..search.labels import connected_pieces, dual_graph
+from ..search.proof import verify
 from ..search.proxy import simplified
 from ..search.search import Search
 from ..workers import parallel_map

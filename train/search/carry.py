@@ -130,13 +130,21 @@ def face_frames(surface: Surface) -> NDArray[np.float64]:
 
 def carried_uv(disk: Surface, source: Flat, config: CarryConfig) -> NDArray[np.float64]:
     """Uv (v, 2) of a piece of the surface, laid out as the twin's piece is; it may hold flips."""
-    frame, twin_frame = face_frames(disk), face_frames(source.surface)
-    nearest = KDTree(features(source.surface, config)).query(features(disk, config))[1]
-    theirs = twin_frame[nearest]
+    turn = nearest_rotations(carried_jacobians(disk, source, nearest_faces(disk, source.surface, config)))
+    return RigidSteps(disk).run(turn, config.rigid_steps)
+
+
+def nearest_faces(disk: Surface, twin: Surface, config: CarryConfig) -> NDArray[np.int64]:
+    """(f,) the face of the twin that lies nearest to each face, by position and normal."""
+    return np.asarray(KDTree(features(twin, config)).query(features(disk, config))[1], dtype=np.int64)
+
+
+def carried_jacobians(disk: Surface, source: Flat, nearest: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(f, 2, 2) the derivative in the plane of each face, as its nearest face (f,) of the twin has it in its own."""
+    frame, theirs = face_frames(disk), face_frames(source.surface)[nearest]
     turned = turned_into(frame[:, :2], frame[:, 2], theirs[:, 2])
     between = np.einsum("fic,fjc->fji", turned, theirs[:, :2])
-    turn = nearest_rotations(jacobians(source.surface, source.uv))[nearest] @ nearest_rotations(between)
-    return RigidSteps(disk).run(turn, config.rigid_steps)
+    return jacobians(source.surface, source.uv)[nearest] @ nearest_rotations(between)
 
 
 def turned_into(

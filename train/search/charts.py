@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.errors import FinishError
-from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
 from ..finish.contact import excess_energy
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, border_length, extract
 from ..finish.slits import Flat
-from ..workers import parallel_map
+from ..workers import one_thread_each, parallel_map
 from .carry import carried_back
 from .develop import Development, unfold
+from .fine import refined
 from .labels import dual_graph
 from .parts import Part, split_parts
 from .planar import flat_regions
-from .proxy import simplified
+from .proof import is_valid, verify
+from .proxy import simplified, thinned
 from .search import Search
 from .slivers import steadied
 from .starts import clusters, pieces_by_score
@@ -93,7 +93,8 @@ def chart_surface(
         return solve_part(part.surface, charts, starts, config)
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
-    solved = dict(zip(largest_first, parallel_map(solve, largest_first), strict=True))
+    with one_thread_each():
+        solved = dict(zip(largest_first, parallel_map(solve, largest_first), strict=True))
     pieces = [
         placed(piece, part, surface, total)
         for number, part in enumerate(parts)
@@ -215,6 +216,25 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     exact = unfolded_part(surface, charts, config)
     if exact is not None and exact.way == "unfolded":
         return exact
+    many = len(surface.faces) > config.fine.above * config.fine.faces
+    middle = thinned(surface, config.fine) if many else surface
+    pieces = searched_pieces(middle, charts, starts, config, exact)
+    if middle is not surface:
+        pieces = refined(surface, middle, pieces, config)
+    if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
+        return exact
+    energy = sum(piece.energy for piece in pieces)
+    if energy > config.resort_excess:
+        resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
+        if sum(piece.energy for piece in resort) < energy:
+            return Solved(resort, "xatlas")
+    return Solved(pieces, "searched")
+
+
+def searched_pieces(
+    surface: Surface, charts: int, starts: Starts, config: FinishConfig, exact: Solved | None
+) -> list[Piece]:
+    """Charts of a part by a search on its simplified twin; ``exact``: its facets, another start where it is small."""
     whole = exact is not None and len(surface.faces) <= config.whole_faces
     coarse = surface if whole else simplified(surface, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
@@ -222,14 +242,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
         found = carried_back(surface, coarse, found, charts, config)
     found.slit_all(config.slit_above, contacts=True)
     found.polish()
-    pieces = list(found.pieces.values())
-    if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
-        return exact
-    if found.energy() > config.resort_excess:
-        resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
-        if sum(piece.energy for piece in resort) < found.energy():
-            return Solved(resort, "xatlas")
-    return Solved(pieces, "searched")
+    return list(found.pieces.values())
 
 
 def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
@@ -307,21 +320,3 @@ def as_piece(surface: Surface, development: Development) -> Piece:
     whole = extract(surface, development.ids)
     slits = (border_length(flat.surface) - border_length(whole)) / 2.0
     return Piece(development.ids, flat, excess_energy(flat.surface, flat.uv), slits)
-
-
-def verify(pieces: list[Piece]) -> None:
-    """The exact check of each piece: raises FinishError where a triangle is flipped or two overlap."""
-    for number, piece in enumerate(pieces):
-        uv = piece.flat.uv[piece.flat.surface.faces]
-        flips, overlaps = int(flipped_triangles(uv).sum()), len(overlapping_pairs(uv))
-        if flips or overlaps:
-            raise FinishError(
-                f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping "
-                "pairs, expected none; please report the mesh"
-            )
-
-
-def is_valid(piece: Piece) -> bool:
-    """True for a piece without flips and overlap, by the exact tests."""
-    uv = piece.flat.uv[piece.flat.surface.faces]
-    return not flipped_triangles(uv).any() and len(overlapping_pairs(uv)) == 0

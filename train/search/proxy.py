@@ -5,11 +5,61 @@ Splitting and merging weighs dozens of flattenings; on a few thousand faces each
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+import fast_simplification
 import igl
 import numpy as np
 
-from ...runtime.geometry.topology import split_non_manifold_vertices
+from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic, split_non_manifold_vertices
 from ...runtime.mesh import Surface
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..config import FineConfig
+
+
+def thinned(surface: Surface, config: FineConfig) -> Surface:
+    """About ``config.faces`` faces of a surface of many more, in a tenth of the time that ``simplified`` takes.
+
+    Quadric errors again, but edges below a rising threshold collapse in the order they come in (Forstmann, Fast
+    quadric mesh simplification).  In a plane every collapse is free, and slivers are what is left: vertices are moved
+    a little first, so that short edges cost least.  ``simplified`` does the rest, and all where the topology changed.
+    """
+    if len(surface.faces) <= config.early * config.faces:
+        return simplified(surface, config.faces)
+    manifold, old = split_non_manifold_vertices(surface.faces)
+    moved = jittered(surface.vertices[old], manifold, config.jitter)
+    found = fast_simplification.simplify(
+        moved, manifold.astype(np.int32), target_count=config.early * config.faces, agg=config.haste
+    )
+    coarse = compact(np.asarray(found[0], dtype=np.float64), np.asarray(found[1], dtype=np.int64))
+    same = topology_of(coarse.faces) == topology_of(manifold) and len(coarse.faces) < len(surface.faces)
+    return simplified(coarse if same else surface, config.faces)
+
+
+def jittered(vertices: NDArray[np.float64], faces: NDArray[np.int64], share: float) -> NDArray[np.float64]:
+    """Vertices (v, 3) of faces (f, 3), each moved by about a share of its shortest edge, always alike."""
+    corner = vertices[faces]
+    length = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)
+    shortest = np.full(len(vertices), np.inf)
+    np.minimum.at(shortest, faces, np.minimum(length, np.roll(length, 1, axis=1)))
+    moves = np.random.default_rng(0).normal(scale=share, size=vertices.shape)
+    return vertices + moves * np.where(np.isfinite(shortest), shortest, 0.0)[:, None]
+
+
+def topology_of(faces: NDArray[np.int64]) -> tuple[int, int, bool]:
+    """Euler characteristic, number of boundary loops, and whether an edge is not manifold."""
+    table = edge_table(faces)
+    return euler_characteristic(faces), len(boundary_loops(faces)), bool((table.interior & ~table.manifold).any())
+
+
+def compact(vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> Surface:
+    """The triangles that have an area, over the vertices they use."""
+    solid = Surface(vertices, triangles).face_areas() > 0.0
+    used, index = np.unique(triangles[solid], return_inverse=True)
+    return Surface(np.ascontiguousarray(vertices[used]), index.reshape(-1, 3).astype(np.int64))
 
 
 def simplified(surface: Surface, faces: int) -> Surface:
@@ -25,6 +75,4 @@ def simplified(surface: Surface, faces: int) -> Surface:
     coarse, triangles = np.asarray(found[0], dtype=np.float64), np.asarray(found[1], dtype=np.int64)
     if len(triangles) == 0:
         return surface
-    solid = Surface(coarse, triangles).face_areas() > 0.0
-    used, index = np.unique(triangles[solid], return_inverse=True)
-    return Surface(np.ascontiguousarray(coarse[used]), index.reshape(-1, 3).astype(np.int64))
+    return compact(coarse, triangles)

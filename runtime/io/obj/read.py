@@ -19,7 +19,8 @@ from ...errors import MeshError
 from ...material import Material
 from ..polygons import triangulate
 from ..rawmesh import RawMesh
-from ..text import lines_of, number_table, shown
+from ..text import shown
+from .lines import split
 from .materials import read_mtl
 
 if TYPE_CHECKING:
@@ -27,18 +28,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-KINDS = ("v", "vt", "vn", "f", "usemtl", "mtllib", "l", "p")
+    from .lines import Lines
+
 COLOR_COLUMNS = {6: 3, 7: 4}  # x y z r g b, and x y z w r g b: numbers in a line → first colour
 # (slashes, two in a row) of every corner of a file → which of v, vt, vn its numbers are
 UNIFORM = {(0, False): (0,), (1, False): (0, 1), (2, True): (0, 2), (2, False): (0, 1, 2)}
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """The file by kind of line: text (after the keyword) and line number of each."""
-
-    text: dict[str, list[str]]
-    number: dict[str, NDArray[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +57,15 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
     Raises:
         MeshError: unreadable numbers, vertices that are not there or not finite, no faces; it names the line.
     """
-    lines = _split(data)
-    changes = {"skipped_lines": len(lines.text["l"]), "skipped_points": len(lines.text["p"])}
+    lines = split(data)
+    changes = {"skipped_lines": lines.count("l"), "skipped_points": lines.count("p")}
     positions, colors = _vertices(lines, changes)
     polygons = _polygons(lines, changes)
     _check_positions(positions, lines, polygons)
     triangles, polygon = triangulate(positions, polygons.corners[:, 0], polygons.size)
     corners = polygons.corners
-    file_uv, uv_width = number_table(lines.text["vt"], lines.number["vt"], 1, 2)
-    file_normals, _ = number_table(lines.text["vn"], lines.number["vn"], 3, 3)
+    file_uv, uv_width = lines.numbers("vt", 1, 2)
+    file_normals, _ = lines.numbers("vn", 3, 3)
     vertex, faces = _split_vertices(corners, triangles)
     materials, face_material = _materials(lines, polygons.number[polygon], read_sibling, changes)
     has_uv, has_normals = bool((corners[:, 1] >= 0).any()), bool((corners[:, 2] >= 0).all())
@@ -89,38 +83,9 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
     )
 
 
-def _split(data: bytes) -> _Lines:
-    """The lines by kind; a backslash at the end joins the next line.  Raises: MeshError where there is no face."""
-    found: dict[str, list[str]] = {kind: [] for kind in KINDS}
-    number: dict[str, list[int]] = {kind: [] for kind in KINDS}
-    waiting = ""
-    for index, line in enumerate(lines_of(data), start=1):
-        if line.endswith("\\"):
-            waiting += line[:-1] + " "
-            continue
-        kind, _, rest = (waiting + line).replace("\t", " ").lstrip().partition(" ")
-        waiting = ""
-        if kind in found:
-            found[kind].append(rest.strip() if kind in ("usemtl", "mtllib") else rest.partition("#")[0])
-            number[kind].append(index)
-    if not found["f"]:
-        raise MeshError(
-            "the file holds points and no faces, expected faces; give points as .ply, .xyz or .npy"
-            if found["v"]
-            else "no vertex and no face in this OBJ file (lines that start with 'v' and 'f'), expected a mesh; "
-            f"it begins with {shown(decode_head(data))}: check the export"
-        )
-    return _Lines(text=found, number={kind: np.array(value, dtype=np.int64) for kind, value in number.items()})
-
-
-def decode_head(data: bytes) -> str:
-    """The first line that is not empty."""
-    return next((line for line in lines_of(data[:1000]) if line.strip()), "")
-
-
-def _vertices(lines: _Lines, changes: dict[str, int]) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
+def _vertices(lines: Lines, changes: dict[str, int]) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
     """(n, 3) float64 positions, and (n, 4) uint8 colours where the lines have them; changes grow."""
-    numbers, width = number_table(lines.text["v"], lines.number["v"], 2, 8)
+    numbers, width = lines.numbers("v", 2, 8)
     if numbers.shape[1] < 3:
         numbers = np.column_stack([numbers, np.zeros(len(numbers))])
     numbers[width < 3, 2] = 0.0
@@ -137,8 +102,34 @@ def _vertices(lines: _Lines, changes: dict[str, int]) -> tuple[NDArray[np.float6
     return numbers[:, :3], np.rint(np.hstack([rgb, alpha])).astype(np.uint8)
 
 
-def _polygons(lines: _Lines, changes: dict[str, int]) -> _Polygons:
+def _polygons(lines: Lines, changes: dict[str, int]) -> _Polygons:
     """The faces of three corners or more, every index resolved; changes grow."""
+    changes["faces_under_three_corners"] = 0
+    if lines.faces is None:
+        table, size, number = _corners(lines, changes)
+    else:
+        (table, size), number = lines.faces, lines.number["f"]
+    at_line = np.repeat(number, size)
+    changes["missing_uv_or_normals"] = 0
+    for column, kind in enumerate(("v", "vt", "vn")):
+        count, index = lines.count(kind), table[:, column]
+        so_far = np.searchsorted(lines.number[kind], at_line) if index.min() < 0 else np.zeros_like(index)
+        resolved = np.where(index > 0, index - 1, np.where(index < 0, so_far + index, -1))
+        outside = (resolved >= count) | ((resolved < 0) & ((index != 0) | (column == 0)))
+        if column == 0 and outside.any():
+            first = int(np.argmax(outside))
+            before = int(np.searchsorted(lines.number[kind], at_line[first]))
+            raise MeshError(
+                f"line {at_line[first]} refers to vertex {index[first]}, expected 1 to {count} or −{before} to "
+                "−1; the OBJ file is damaged: export it again"
+            )
+        changes["missing_uv_or_normals"] += int(np.count_nonzero(outside))
+        table[:, column] = np.where(outside, -1, resolved)
+    return _Polygons(table, size, number)
+
+
+def _corners(lines: Lines, changes: dict[str, int]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Corners (c, 3) as the file counts, how many each face has (p,), and the line of each (p,); changes grow."""
     words = [line.split() for line in lines.text["f"]]
     whole = [index for index, polygon in enumerate(words) if len(polygon) >= 3]
     changes["faces_under_three_corners"] = len(words) - len(whole)
@@ -150,30 +141,14 @@ def _polygons(lines: _Lines, changes: dict[str, int]) -> _Polygons:
     number = lines.number["f"][whole]
     size = np.array([len(words[index]) for index in whole], dtype=np.int64)
     flat = [word for index in whole for word in words[index]]
-    at_line = np.repeat(number, size)
     try:
-        table = _index_table(flat)
+        return _index_table(flat), size, number
     except (ValueError, OverflowError) as error:
         place = next(index for index, word in enumerate(flat) if not _is_corner(word))
         raise MeshError(
-            f"line {at_line[place]} has the corner {shown(flat[place])}, expected indices such as 7, 7/8 or 7/8/9; "
-            "mend or remove that line"
+            f"line {np.repeat(number, size)[place]} has the corner {shown(flat[place])}, expected indices such as 7, "
+            "7/8 or 7/8/9; mend or remove that line"
         ) from error
-    changes["missing_uv_or_normals"] = 0
-    for column, kind in enumerate(("v", "vt", "vn")):
-        count, index = len(lines.text[kind]), table[:, column]
-        so_far = np.searchsorted(lines.number[kind], at_line)
-        resolved = np.where(index > 0, index - 1, np.where(index < 0, so_far + index, -1))
-        outside = (resolved >= count) | ((resolved < 0) & ((index != 0) | (column == 0)))
-        if column == 0 and outside.any():
-            first = int(np.argmax(outside))
-            raise MeshError(
-                f"line {at_line[first]} refers to vertex {index[first]}, expected 1 to {count} or −{so_far[first]} to "
-                "−1; the OBJ file is damaged: export it again"
-            )
-        changes["missing_uv_or_normals"] += int(np.count_nonzero(outside))
-        table[:, column] = np.where(outside, -1, resolved)
-    return _Polygons(table, size, number)
 
 
 def _is_corner(word: str) -> bool:
@@ -194,7 +169,7 @@ def _index_table(words: list[str]) -> NDArray[np.int64]:
     return np.array([int(index or 0) for index in flat], dtype=np.int64).reshape(-1, 3)
 
 
-def _check_positions(positions: NDArray[np.float64], lines: _Lines, polygons: _Polygons) -> None:
+def _check_positions(positions: NDArray[np.float64], lines: Lines, polygons: _Polygons) -> None:
     """Refuse vertices of faces that are not finite, by their line."""
     broken = ~np.isfinite(positions[polygons.corners[:, 0]]).all(axis=1)
     if broken.any():
@@ -226,7 +201,7 @@ def _uv(file_uv: NDArray[np.float64], width: NDArray[np.int64], index: NDArray[n
     return table[index]
 
 
-def _libraries(lines: _Lines, read_sibling: Callable[[str], bytes | None]) -> list[str]:
+def _libraries(lines: Lines, read_sibling: Callable[[str], bytes | None]) -> list[str]:
     """Names of material libraries: a line is one name with spaces in it where such a file is there, else several."""
     names: list[str] = []
     for line in lines.text["mtllib"]:
@@ -235,7 +210,7 @@ def _libraries(lines: _Lines, read_sibling: Callable[[str], bytes | None]) -> li
 
 
 def _materials(
-    lines: _Lines,
+    lines: Lines,
     at_line: NDArray[np.int64],
     read_sibling: Callable[[str], bytes | None],
     changes: dict[str, int],

@@ -19,7 +19,8 @@ from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FinishConfig, StartConfig
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.search import charts as module
-from flexpara.train.search.charts import Finished, chart_surface, objective, verify
+from flexpara.train.search.charts import Finished, chart_surface, objective
+from flexpara.train.search.proof import verify
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,9 @@ from flexpara.runtime.geometry.topology import components, edge_table, euler_cha
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.search.proxy import simplified
+from flexpara.train.config import FineConfig
+from flexpara.train.search import proxy
+from flexpara.train.search.proxy import simplified, thinned, topology_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FACES = 1000
+CONFIG = FineConfig(faces=FACES)
 
 
 def sample(name: str, resolution: int) -> Surface:
@@ -147,3 +150,40 @@ def test_the_twin_of_a_real_mesh_keeps_its_shape(name: str, models: Path) -> Non
     assert 2700 <= len(twin.faces) <= 3000
     assert euler_characteristic(twin.faces) == euler_characteristic(surface.faces)
     assert distance(surface, twin) < 0.06
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "cloth"])
+def test_a_thinned_surface_keeps_shape_and_topology_without_slivers(name: str) -> None:
+    surface = sample(name, 128)
+    twin = thinned(surface, CONFIG)
+    assert_sound(twin)
+    assert 0.9 * FACES < len(twin.faces) < 1.1 * FACES
+    assert topology_of(twin.faces) == topology_of(surface.faces)
+    assert distance(surface, twin) < 0.1
+    assert twin.face_areas().min() > 1e-4 * twin.face_areas().mean()
+
+
+def test_a_finely_divided_plane_leaves_no_slivers() -> None:
+    cloth = sample("cloth", 96)
+    twin = thinned(Surface(cloth.vertices * [1.0, 1.0, 0.0], cloth.faces), FineConfig(faces=500))
+    corner = twin.triangles
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    assert (twin.face_areas() / longest**2).min() > 0.003
+
+
+def test_where_thinning_breaks_the_topology_the_careful_way_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = sample("torus", 48)
+    broken = np.asfortranarray(surface.vertices), surface.faces[: len(surface.faces) // 2]
+    monkeypatch.setattr(proxy.fast_simplification, "simplify", lambda *_, **__: broken)
+    twin = thinned(surface, CONFIG)
+    assert_sound(twin)
+    assert euler_characteristic(twin.faces) == 0
+
+
+def test_thinning_twice_gives_the_same_and_leaves_the_source_alone() -> None:
+    surface = sample("sphere", 64)
+    before = surface.vertices.copy()
+    first, second = thinned(surface, CONFIG), thinned(surface, CONFIG)
+    assert np.array_equal(first.vertices, second.vertices)
+    assert np.array_equal(first.faces, second.faces)
+    assert np.array_equal(surface.vertices, before)

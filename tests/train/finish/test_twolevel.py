@@ -1,0 +1,68 @@
+"""Conjugate gradients with a coarse level: the solution of a direct solve, in steps that the size does not decide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from flexpara.train.finish.twolevel import TwoLevel
+
+
+def chain(count: int) -> sparse.csr_array:
+    """The stiffness of a chain held lightly at its first node."""
+    row = np.arange(count - 1)
+    entries = np.r_[-np.ones(count - 1), np.ones(count - 1)], (np.r_[row, row], np.r_[row, row + 1])
+    bonds = sparse.csr_array(entries, shape=(count - 1, count))
+    held = sparse.csr_array(([1e-3], ([0], [0])), shape=(count, count))
+    return sparse.csr_array(bonds.T @ bonds + held)
+
+
+def direct(matrix: sparse.csr_array, right: np.ndarray) -> np.ndarray:
+    return np.linalg.solve(matrix.toarray(), right)
+
+
+def hats(count: int, spacing: int) -> sparse.csr_array:
+    """Weights of every ``spacing``-th node, linear between them."""
+    place = np.arange(count) / spacing
+    left = np.floor(place).astype(np.int64)
+    share = place - left
+    rows = np.r_[np.arange(count), np.arange(count)]
+    return sparse.csr_array((np.r_[1.0 - share, share], (rows, np.r_[left, left + 1])), shape=(count, left.max() + 2))
+
+
+def steps_of(count: int, monkeypatch: pytest.MonkeyPatch) -> int:
+    steps = []
+    plain = TwoLevel.preconditioned
+    monkeypatch.setattr(TwoLevel, "preconditioned", lambda self, r: steps.append(1) or plain(self, r))
+    solver = TwoLevel(chain(count), hats(count, 8)[:, :-1] if (count - 1) % 8 == 0 else hats(count, 8), 1e-8, 500)
+    right = np.random.default_rng(0).normal(size=(count, 1))
+    solver.solve(right, None, float(np.linalg.norm(right)))
+    monkeypatch.undo()
+    return len(steps)
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_the_solution_is_that_of_a_direct_solve(columns: int) -> None:
+    matrix, right = chain(97), np.random.default_rng(1).normal(size=(97, columns))
+    found = TwoLevel(matrix, hats(97, 8)[:, :-1], 1e-12, 500).solve(right, None, float(np.linalg.norm(right)))
+    np.testing.assert_allclose(found, direct(matrix, right), rtol=1e-6, atol=1e-6)
+
+
+def test_a_start_at_the_solution_stays_there() -> None:
+    matrix, right = chain(97), np.ones((97, 2))
+    exact = direct(matrix, right)
+    found = TwoLevel(matrix, hats(97, 8)[:, :-1], 1e-6, 500).solve(right, exact, float(np.linalg.norm(right)))
+    assert np.array_equal(found, exact)
+
+
+def test_ten_times_the_size_takes_hardly_more_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert steps_of(4001, monkeypatch) < 1.5 * steps_of(401, monkeypatch)
+
+
+def test_no_more_steps_are_made_than_allowed() -> None:
+    right = np.random.default_rng(2).normal(size=(97, 1))
+    one, all_of_them = (
+        TwoLevel(chain(97), hats(97, 8)[:, :-1], 1e-12, most).solve(right, None, 1.0) for most in (1, 500)
+    )
+    assert np.abs(one - all_of_them).max() > 1e-3

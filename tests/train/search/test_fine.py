@@ -1,0 +1,154 @@
+"""From a middle mesh to the fine one: the same charts, laid out alike, valid, contacts held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from flexpara.runtime.geometry.topology import boundary_loops, edge_table
+from flexpara.runtime.mesh import Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.config import FineConfig, FinishConfig
+from flexpara.train.finish.pieces import Piece, make_piece
+from flexpara.train.search import charts, fine
+from flexpara.train.search.charts import chart_surface, objective
+from flexpara.train.search.fine import bounded, laid_out, overlapping_vertices, refined, weights_of
+from flexpara.train.search.proxy import thinned
+
+CONFIG = FinishConfig()
+MIDDLE = FineConfig(faces=3000)
+
+
+def unit(name: str, resolution: int) -> Surface:
+    """A sample at area 1."""
+    surface = Surface(*make_sample(name, resolution=resolution))
+    return Surface(surface.vertices / np.sqrt(surface.face_areas().sum()), surface.faces)
+
+
+def halves(surface: Surface) -> list[Piece]:
+    """Upper and lower half, each flattened."""
+    up = surface.triangles.mean(axis=1)[:, 2] > 0.0
+    found = [make_piece(surface, np.flatnonzero(side), 1.0, CONFIG) for side in (up, ~up)]
+    return [piece for piece in found if piece is not None]
+
+
+def assert_valid(piece: Piece) -> None:
+    uv = piece.flat.uv[piece.flat.surface.faces]
+    assert not flipped_triangles(uv).any()
+    assert len(overlapping_pairs(uv)) == 0
+
+
+def test_two_halves_of_a_sphere_come_back_valid_with_their_stretch_and_seam() -> None:
+    surface = unit("sphere", 160)
+    middle = thinned(surface, MIDDLE)
+    pieces = halves(middle)
+    found = refined(surface, middle, pieces, CONFIG)
+    assert len(found) == 2
+    assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(surface.faces)))
+    for piece in found:
+        assert_valid(piece)
+    assert sum(piece.energy for piece in found) < 1.05 * sum(piece.energy for piece in pieces)
+    assert objective(surface, found, 0.003) < 1.05 * objective(middle, pieces, 0.003)
+
+
+def test_a_hole_and_a_slit_come_back() -> None:
+    surface = unit("sphere", 120)
+    height = surface.triangles.mean(axis=1)[:, 2]
+    keep = np.flatnonzero(height < height.max() * 0.8)
+    used, faces = np.unique(surface.faces[keep], return_inverse=True)
+    cup = Surface(surface.vertices[used], faces.reshape(-1, 3))
+    cup = Surface(cup.vertices / np.sqrt(cup.face_areas().sum()), cup.faces)
+    middle = thinned(cup, MIDDLE)
+    piece = make_piece(middle, np.arange(len(middle.faces)), 1.0, CONFIG)
+    assert piece is not None
+    (found,) = refined(cup, middle, [piece], CONFIG)
+    assert_valid(found)
+    assert len(boundary_loops(found.flat.surface.faces)) == len(boundary_loops(piece.flat.surface.faces))
+    assert found.slit_length == pytest.approx(piece.slit_length, rel=0.2)
+    assert found.energy < 1.1 * piece.energy
+
+
+def test_what_can_not_be_laid_out_is_flattened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = unit("sphere", 64)
+    middle = thinned(surface, MIDDLE)
+    monkeypatch.setattr(fine, "laid_out", lambda *_: None)
+    found = refined(surface, middle, halves(middle), CONFIG)
+    assert len(found) >= 2
+    for piece in found:
+        assert_valid(piece)
+
+
+def test_weights_are_a_partition_and_hold_the_place() -> None:
+    surface = unit("cloth", 40)
+    middle = unit("cloth", 10)
+    nearest = fine.nearest_faces(surface, middle, CONFIG.carry)
+    weight = weights_of(surface, middle, nearest)
+    assert weight.sum(axis=1) == pytest.approx(1.0)
+    assert weight.data.min() >= 0.0
+    spacing = np.sqrt(middle.face_areas().max())
+    assert np.linalg.norm(weight @ middle.vertices - surface.vertices, axis=1).max() < 2.0 * spacing
+
+
+def test_the_stretch_of_a_sliver_is_not_taken_over() -> None:
+    jacobian = np.stack([np.diag([1.5, 0.9]), np.diag([9.0, 1.0]), np.diag([1.0, 0.1])])
+    np.testing.assert_allclose(bounded(jacobian, 2.0), [np.diag([1.5, 0.9]), np.eye(2), np.eye(2)])
+
+
+def test_a_border_that_crosses_itself_names_the_vertices_there() -> None:
+    surface = unit("cloth", 12)
+    uv = surface.vertices[:, :2].copy()
+    assert not overlapping_vertices(surface.faces, uv).any()
+    turn = 1.3 * np.pi * uv / np.ptp(uv[:, 0])
+    rolled = np.stack([(1.0 + turn[:, 1]) * np.cos(turn[:, 0]), (1.0 + turn[:, 1]) * np.sin(turn[:, 0])], axis=1)
+    rolled[:, 0] += 3.0 * (turn[:, 0] > 1.5 * np.pi)
+    found = overlapping_vertices(surface.faces, rolled)
+    assert found.any()
+    assert not found.all()
+
+
+def test_a_chart_that_touches_itself_stays_apart() -> None:
+    """A strip rolled up once around, nearly closed: laid out rigidly it would overlap where its twin is held apart."""
+    angle = np.linspace(0.0, 1.0, 200)
+    across = np.linspace(0.0, 0.1, 8)
+    x, y = np.meshgrid(angle, across, indexing="ij")
+    turn = 2.0 * np.pi * 1.004 * x
+    flat = np.stack([(1.0 + y) * np.cos(turn), (1.0 + y) * np.sin(turn)], axis=2)
+    index = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.reshape(-1) for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, d, c], axis=1), np.stack([a, c, b], axis=1)])
+    points = np.concatenate([flat.reshape(-1, 2), 0.02 * x.reshape(-1, 1)], axis=1)
+    surface = Surface(points, faces)
+    closed = np.stack([(1.0 + y) * np.cos(turn / 1.02), (1.0 + y) * np.sin(turn / 1.02)], axis=2).reshape(-1, 2)
+    if flipped_triangles(closed[faces]).all():
+        faces = faces[:, [0, 2, 1]]
+        surface = Surface(points, faces)
+    found = laid_out(surface, fine.Flat(surface, closed, {}), CONFIG)
+    assert found is not None
+    assert not flipped_triangles(found[faces]).any()
+    assert not overlapping_vertices(faces, found).any()
+
+
+def test_a_large_part_is_searched_on_its_middle_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = unit("torus", 64)
+    seen: list[int] = []
+    plain = charts.searched_pieces
+
+    def looked_at(mesh: Surface, *rest: Any) -> list[Piece]:
+        seen.append(len(mesh.faces))
+        return plain(mesh, *rest)
+
+    monkeypatch.setattr(charts, "searched_pieces", looked_at)
+    config = replace(CONFIG, fine=FineConfig(faces=2000), surrogate_faces=600)
+    found = chart_surface(surface, 4, config, 0, lambda _: None)
+    assert seen[0] < 2100 < len(surface.faces)
+    label = np.zeros(len(surface.faces), dtype=np.int64)
+    for number, piece in enumerate(found.pieces):
+        label[piece.ids] = number
+    table = edge_table(surface.faces)
+    assert (label[table.edge_faces[:, 0]] != label[table.edge_faces[:, 1]]).any()

@@ -1,0 +1,52 @@
+"""Large sparse systems by conjugate gradients, with a small twin that answers what varies slowly.
+
+A · x = b is symmetric positive definite over n fine unknowns; the rows of P (n, m) are weights, adding up to 1, of m
+coarse ones.  The preconditioner D⁻¹ + P (Pᵀ A P)⁻¹ Pᵀ is the additive two-level one (Bramble, Pasciak & Xu 1990):
+steps are few whatever n is, and memory grows with n where a factorization's fill grows faster.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from .curvature import factorize
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class TwoLevel:
+    """Solves with one matrix: its coarse twin is factorized once."""
+
+    def __init__(self, matrix: sparse.csr_array, coarse: sparse.csr_array, tolerance: float, most: int) -> None:
+        """``coarse`` (n, m): P.  tolerance: of the residual, as a share of a given size; most: steps of a solve."""
+        self.matrix, self.coarse, self.tolerance, self.most = matrix, coarse, tolerance, most
+        self.scale = np.reciprocal(np.asarray(matrix.diagonal(), dtype=np.float64))[:, None]
+        self.transposed = sparse.csr_array(coarse.T)
+        self.solver = factorize(sparse.csr_array(self.transposed @ matrix @ coarse))
+
+    def solve(self, right: NDArray[np.float64], start: NDArray[np.float64] | None, size: float) -> NDArray[np.float64]:
+        """X (n, c) for right sides (n, c), from ``start``: each column by itself, all at once; size: of residuals."""
+        x = np.zeros_like(right) if start is None else start.copy()
+        residual = right - self.matrix @ x
+        z = self.preconditioned(residual)
+        direction, product = z.copy(), (residual * z).sum(axis=0)
+        for _ in range(self.most):
+            if np.linalg.norm(residual) <= self.tolerance * size:
+                break
+            image = self.matrix @ direction
+            step = product / np.maximum((direction * image).sum(axis=0), 1e-300)
+            x += step * direction
+            residual -= step * image
+            z = self.preconditioned(residual)
+            previous, product = product, (residual * z).sum(axis=0)
+            direction *= product / np.maximum(previous, 1e-300)
+            direction += z
+        return x
+
+    def preconditioned(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, c) an estimate of what is missing, from what a residual (n, c) says on both levels."""
+        return self.scale * residual + self.coarse @ self.solver.solve(self.transposed @ residual)

@@ -1,0 +1,153 @@
+"""From a middle mesh, thinned but searched and finished, to the fine surface itself.   f faces · v vertices · area 1.
+
+A fine chart differs from its twin on the middle mesh in detail only.  It takes the twin's rotations, and rigid steps by
+conjugate gradients with the twin as coarse level lay it out: no factorization and no SLIM ever sees the fine surface.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from ...runtime.geometry.distortion import singular_values
+from ...runtime.geometry.overlap import overlapping_pairs
+from ...runtime.geometry.topology import boundary_loops, edge_table
+from ...runtime.mesh import Surface
+from ..finish.arap import RigidSteps, evened_out, nearest_rotations
+from ..finish.contact import boundary_edges, excess_energy, rim_faces
+from ..finish.flatten import Pins, jacobians
+from ..finish.pieces import Piece, border_length, extract, openings
+from ..finish.slits import Flat, slit_along
+from ..finish.twolevel import TwoLevel
+from ..workers import parallel_map
+from .carry import carried_jacobians, fragments_joined, nearest_faces, smoothed_in_band, votes
+from .labels import dual_graph
+from .search import Search
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ..config import FinishConfig
+    from ..finish.arap import Solve
+
+
+def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig) -> list[Piece]:
+    """The charts of the middle mesh on the surface; one that can't be laid out like its twin is flattened anew."""
+    label = np.zeros(len(middle.faces), dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        label[piece.ids] = number
+    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
+    areas = surface.face_areas()
+    smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
+    joined = fragments_joined(smooth, areas, graph)
+    groups = [np.flatnonzero(joined == number) for number in range(int(joined.max()) + 1)]
+    twins = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
+    order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
+    total = float(areas.sum())
+    found = parallel_map(lambda number: refined_piece(surface, groups[number], twins[number], total, config), order)
+    search = None
+    for number, piece in zip(order, found, strict=True):
+        if piece is not None:
+            continue
+        search = search or Search(surface, graph, config)
+        search.add_valid(groups[number], twins[number].slits)
+    return [piece for piece in found if piece is not None] + ([] if search is None else list(search.pieces.values()))
+
+
+def refined_piece(
+    surface: Surface, ids: NDArray[np.int64], twin: Piece, total: float, config: FinishConfig
+) -> Piece | None:
+    """The faces ids (m,) laid out like their twin, of lowest cost; None where no way to open them is valid so."""
+    whole, unit = extract(surface, ids), float(np.sqrt(total))
+    best: Piece | None = None
+    for disk in opened_alike(whole, twin, config):
+        uv = laid_out(disk, twin.flat, config)
+        if uv is None:
+            continue
+        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
+        piece = Piece(ids, Flat(disk, uv, {}), excess_energy(disk, uv) / total, length, twin.slits, twin.resort)
+        if best is None or piece.cost(config.slit.price) < best.cost(config.slit.price):
+            best = piece
+    allowed = config.carry.worse * twin.energy + config.carry.slack * float(whole.face_areas().sum()) / total
+    return best if best is not None and best.energy <= allowed else None
+
+
+def opened_alike(whole: Surface, twin: Piece, config: FinishConfig) -> Iterator[Surface]:
+    """The ways to open a piece that leave as many borders as its twin has; all ways where none does."""
+    ways = [slit_along(way, twin.slits, config.slit) for way in openings(whole, config.slit.seams)]
+    loops = len(boundary_loops(twin.flat.surface.faces))
+    alike = [way for way in ways if len(boundary_loops(way.faces)) == loops]
+    yield from alike or ways
+
+
+def laid_out(disk: Surface, twin: Flat, config: FinishConfig) -> NDArray[np.float64] | None:
+    """Uv (v, 2) of an opened piece, like its twin's, without flips and overlap; None where that can't be had.
+
+    First with the twin's stretch, contacts and all, then as rigid as it may become without overlap.
+    """
+    fine = config.fine
+    nearest = nearest_faces(disk, twin.surface, config.carry)
+    coarse = weights_of(disk, twin.surface, nearest)
+    solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
+    rigid = RigidSteps(disk, solver)
+    valid = None
+    uv = rigid.solve(bounded(carried_jacobians(disk, twin, nearest), fine.steepest), coarse @ twin.uv)
+    touching = np.zeros(len(uv), dtype=bool)
+    for _ in range(fine.steps + fine.contacts):
+        flat = evened_out(disk.faces, uv, config.slit.contact.unfolding)
+        found = overlapping_vertices(disk.faces, uv if flat is None else flat)
+        if flat is not None and not found.any():
+            valid = flat
+        elif valid is not None:
+            touching |= found
+            held = np.flatnonzero(touching)
+            rigid = RigidSteps(disk, solver, Pins(held, valid[held], fine.hold))
+            uv = valid
+        uv = rigid.solve(nearest_rotations(jacobians(disk, uv)), uv)
+    return valid
+
+
+def bounded(jacobian: NDArray[np.float64], steepest: float) -> NDArray[np.float64]:
+    """Jacobians (f, 2, 2); those that stretch or squeeze by more than a factor are rotations alone: a sliver's."""
+    large, small = singular_values(jacobian)
+    wild = (large > steepest) | (small < 1.0 / steepest)
+    return np.where(wild[:, None, None], nearest_rotations(jacobian), jacobian)
+
+
+def overlapping_vertices(faces: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(v,) bool: a face at the vertex, along the border, lies over another; none where no border crosses itself."""
+    rim = rim_faces(faces, boundary_edges(faces))
+    found = np.zeros(len(uv), dtype=bool)
+    found[faces[rim[overlapping_pairs(uv[faces[rim]])]]] = True
+    return found
+
+
+def solver_with(coarse: sparse.csr_array, tolerance: float, most: int, matrix: sparse.csr_array) -> Solve:
+    """Solves by conjugate gradients with a coarse level (v, w)."""
+    return TwoLevel(matrix, coarse, tolerance, most).solve
+
+
+def weights_of(disk: Surface, twin: Surface, nearest: NDArray[np.int64]) -> sparse.csr_array:
+    """(v, w) weights of the twin's vertices at those of a piece: barycentric in the nearest (f,) of a face around it.
+
+    Clipped to the triangle: no weight is negative, and they add up to 1.
+    """
+    count = len(disk.vertices)
+    face = np.zeros(count, dtype=np.int64)
+    face[disk.faces.reshape(-1)] = np.repeat(nearest, 3)
+    corner = twin.triangles[face]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    offset = disk.vertices - corner[:, 0]
+    a, b, c = (np.einsum("vc,vc->v", x, y) for x, y in ((first, first), (first, second), (second, second)))
+    p, q = np.einsum("vc,vc->v", offset, first), np.einsum("vc,vc->v", offset, second)
+    determinant = np.maximum(a * c - b * b, 1e-300)
+    one, two = (c * p - b * q) / determinant, (a * q - b * p) / determinant
+    weight = np.clip(np.stack([1.0 - one - two, one, two], axis=1), 0.0, 1.0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    entries = weight.reshape(-1), (np.repeat(np.arange(count), 3), twin.faces[face].reshape(-1))
+    return sparse.csr_array(entries, shape=(count, len(twin.vertices)))
