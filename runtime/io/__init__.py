@@ -1,1 +1,4 @@
-"""Files and arrays in, meshes and point clouds out, and back: a reader and a writer for each format."""
+"""Files and arrays in, meshes and point clouds out, and back: a reader and a writer for each format.
+
+Public face: `meshfile.load_asset`, `points.cloudfile.load_cloud`; each format's folder has its reader and its writer.
+"""

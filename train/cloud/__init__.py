@@ -1,1 +1,4 @@
-"""Triangles laid over a point cloud."""
+"""Triangles laid over a point cloud.
+
+Public face: `reconstruct.reconstruct` and `config.CloudConfig`.
+"""
