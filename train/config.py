@@ -115,6 +115,8 @@ class CarryConfig:
     """Excess energy of a carried chart, as a multiple of the proxy's, up to which it is taken at once."""
     slack: float = 0.005
     """Mean excess energy added to that."""
+    islet: float = 0.001
+    """Share of a part below which a fragment of a label joins a neighbour."""
     rigid_steps: int = 4
     """Steps of as-rigid-as-possible flattening from the twin's rotations."""
 
@@ -197,6 +199,12 @@ class FinishConfig:
     """Mean excess energy of a flattening that is not even tested for overlap."""
     bearable: float = 0.5
     """Mean excess energy above which a piece is cut before anything else."""
+    flaps: float = 0.02
+    """Share of a flattening that may lie over the rest of it and goes to the charts beside it."""
+    flap_edges: int = 4
+    """Edges at which such faces are tried to be put on, one at a time, where they do not fit at all of them."""
+    stretched: float = 0.05
+    """Mean excess energy above which a piece is split, where that pays, before others are merged."""
     doubt: float = 0.003
     """How much better than foretold a merge may turn out: those foretold worse are not tried."""
     looks: int = 4

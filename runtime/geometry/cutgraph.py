@@ -130,3 +130,32 @@ def prune(table: EdgeTable, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if not dead.any():
             return cut
         cut &= ~dead
+
+
+def cut_chains(table: EdgeTable, cut: NDArray[np.bool_]) -> list[list[int]]:
+    """The cut edges as vertex paths between its junctions, ends and the border: each begins where it can be cut from.
+
+    That is the border, or a path before it; a path back to its own beginning comes in two halves.
+    """
+    around: dict[int, list[int]] = {}
+    for a, b in table.edges[cut].tolist():
+        around.setdefault(a, []).append(b)
+        around.setdefault(b, []).append(a)
+    border = set(np.unique(table.edges[table.edge_count == 1]).tolist())
+    nodes = {vertex for vertex, others in around.items() if len(others) != 2 or vertex in border}
+    begin = sorted(nodes & border) or sorted(nodes) or sorted(around)
+    queue, seen, chains = list(begin) if nodes & border else begin[:1], set[tuple[int, int]](), list[list[int]]()
+    while queue:
+        first = queue.pop(0)
+        for second in around[first]:
+            if (first, second) in seen:
+                continue
+            path = [first, second]
+            while path[-1] not in nodes and path[-1] != first:
+                path.append(next(vertex for vertex in around[path[-1]] if vertex != path[-2]))
+            seen |= {(path[0], path[1]), (path[-1], path[-2])}
+            half = len(path) // 2
+            chains += [path] if path[0] != path[-1] else [path[: half + 1], path[half:]]
+            if path[-1] not in queue:
+                queue.append(path[-1])
+    return chains

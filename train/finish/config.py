@@ -69,6 +69,8 @@ class SlitConfig:
     """No slit aims at a vertex closer to the border than this."""
     ways: int = 1
     """Ways to the same vertex that are tried."""
+    astray: float = 3.0
+    """Distance from its end to the nearest vertex, in steps of its own points, from which a slit lies elsewhere."""
     apart: float = 0.6
     """How far from the first way's start the second must start, as a share of its length."""
     failures: int = 3

@@ -11,23 +11,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
-from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic, split_non_manifold_vertices
+from ...runtime.geometry.topology import split_non_manifold_vertices
 from ...runtime.mesh import Surface
 from .arap import unfolded
 from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_faces, rim_overlaps, separate
 from .curvature import border_first
-from .disks import cut_open, disk_cuts
 from .flatten import circle_map, fill_holes, slim, sorted_loops
-from .slits import Flat, Slit, foreseen_slits, slit_along, slit_where_it_pays
+from .openings import openings, slit_along
+from .slits import Flat, Slit, foreseen_slits, slit_where_it_pays
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     Start = Callable[[Surface], NDArray[np.float64]]
 
-    from ...runtime.geometry.cutgraph import SeamPrices
     from ..config import FinishConfig
     from .config import ContactConfig, SlitConfig
 
@@ -69,17 +68,18 @@ class Piece:
 class Overlapping:
     """A set of faces whose flattening without flips lies over itself.
 
-    ids: (m,) int64.  faces: (m, 3) of the opened piece.  uv: (v, 2).
+    ids: (m,) int64.  flat: its faces are in the order of ids.  slits: in it, as of a piece.
     """
 
     ids: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    uv: NDArray[np.float64]
+    flat: Flat
+    slits: tuple[Slit, ...]
 
     def pairs(self) -> NDArray[np.int64]:
         """(p, 2) rows of faces along the border that overlap."""
-        rim = rim_faces(self.faces, boundary_edges(self.faces))
-        return rim[overlapping_pairs(self.uv[self.faces[rim]])]
+        faces = self.flat.surface.faces
+        rim = rim_faces(faces, boundary_edges(faces))
+        return rim[overlapping_pairs(self.flat.uv[faces[rim]])]
 
 
 def extract(surface: Surface, ids: NDArray[np.int64]) -> Surface:
@@ -92,18 +92,6 @@ def border_length(piece: Surface) -> float:
     """Length of all boundary edges, in source units."""
     edges = boundary_edges(piece.faces)
     return float(np.linalg.norm(piece.vertices[edges[:, 1]] - piece.vertices[edges[:, 0]], axis=1).sum())
-
-
-def openings(piece: Surface, prices: SeamPrices) -> Iterator[Surface]:
-    """The ways to see a piece as a disk: with its holes filled where it has no handles, and cut along short paths."""
-    loops = len(boundary_loops(piece.faces))
-    genus = 2 - loops - euler_characteristic(piece.faces)
-    if genus == 0 and loops > 0:
-        yield piece
-    if genus != 0 or loops != 1:
-        table = edge_table(piece.faces)
-        faces, old = cut_open(piece.faces, disk_cuts(piece, table, prices), table)
-        yield Surface(piece.vertices[old], faces)
 
 
 def flattened(
@@ -175,12 +163,13 @@ def try_piece(
     ``start``: a first uv of the opened piece, which then gets no slits but those given.
     """
     whole = extract(surface, ids)
-    unit, price = float(np.sqrt(total_area)), config.slit.price
+    price = config.slit.price
     best: Piece | Overlapping | None = None
-    for plain in openings(whole, config.slit.seams):
-        disk, more = slit_along(plain, slits, config.slit), ()
+    for disk, cuts in openings(slit_along(whole, slits, config.slit), config.slit.seams):
+        more = cuts
         if start is None:
-            disk, more = foreseen_slits(disk, total_area, config.slit)
+            disk, foreseen = foreseen_slits(disk, total_area, config.slit)
+            more = (*cuts, *foreseen)
         uv = flattened(disk, config.slit.contact, goal * total_area, start)
         if uv is None:
             continue
@@ -191,14 +180,22 @@ def try_piece(
         if rim_overlaps(disk.faces, edges, uv):
             apart = separate(disk, Relaxed(uv, {}), edges, config.slit.contact) if start is not None else None
             if apart is None:
-                best = best or Overlapping(ids, disk.faces, uv)
+                best = best or Overlapping(ids, Flat(disk, uv, {}), (*slits, *more))
                 continue
-            uv, energy = apart.uv, excess_energy(disk, apart.uv) / total_area
-        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
-        piece = Piece(ids, Flat(disk, uv, {}), energy, length, (*slits, *more))
+            uv = apart.uv
+        piece = measured(surface, ids, Flat(disk, uv, {}), total_area, (*slits, *more))
         if not isinstance(best, Piece) or piece.cost(price) < best.cost(price):
             best = piece
     return best
+
+
+def measured(
+    surface: Surface, ids: NDArray[np.int64], flat: Flat, total_area: float, slits: tuple[Slit, ...] = ()
+) -> Piece:
+    """A flattening of faces of the surface as a piece, with its energy and the length of the cuts in it."""
+    cuts = (border_length(flat.surface) - border_length(extract(surface, ids))) / 2.0
+    energy = excess_energy(flat.surface, flat.uv) / total_area
+    return Piece(ids, flat, energy, cuts / float(np.sqrt(total_area)), slits)
 
 
 def slit_further(piece: Piece, total_area: float, config: SlitConfig, *, contacts: bool = False) -> Piece:

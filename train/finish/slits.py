@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import KDTree
 
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.topology import EdgeTable, edge_table
@@ -66,14 +65,23 @@ def stress(flat: Flat, table: EdgeTable, radius: float, rings: int) -> NDArray[n
 
 
 class Slit(NamedTuple):
-    """A cut inside a piece, by its points in space (n, 3): from a border vertex to an inner one."""
+    """A cut inside a piece, by its points in space (n, 3): from a border vertex to an inner one.
+
+    through: it ends on a border too, of another hole or across a handle, and opens what is not a disk.
+    """
 
     points: NDArray[np.float64]
+    through: bool = False
 
     @property
     def length(self) -> float:
         """Length of the polyline, in source units."""
         return float(np.linalg.norm(self.points[1:] - self.points[:-1], axis=1).sum())
+
+    @property
+    def step(self) -> float:
+        """Mean distance between its points."""
+        return self.length / max(len(self.points) - 1, 1)
 
 
 def slit_to(flat: Flat, path: list[int], table: EdgeTable) -> Flat:
@@ -133,37 +141,6 @@ def path_length(surface: Surface, path: list[int]) -> float:
     """Length of a vertex path, in source units."""
     points = surface.vertices[path]
     return float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum())
-
-
-def slit_along(surface: Surface, slits: tuple[Slit, ...], config: SlitConfig) -> Surface:
-    """The piece with slits made elsewhere: between the vertices nearest to their ends, in their order."""
-    flat = Flat(surface, np.zeros((len(surface.vertices), 2)), {})
-    for slit in slits:
-        table = edge_table(flat.surface.faces)
-        border = np.unique(table.edges[table.edge_count == 1])
-        points = flat.surface.vertices
-        gap = np.linalg.norm(points[border] - slit.points[0], axis=1)
-        # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
-        cost = edge_costs(flat.surface, table, config.seams) * detour(points[table.edges], slit)
-        paths = shortest_paths(len(points), table.edges, cost, border[gap <= gap.min()])
-        # the border itself is no way to cut along: the path leaves it where it last touches it
-        path = trace_back(paths.parent, int(np.linalg.norm(points - slit.points[-1], axis=1).argmin()))
-        on_border = np.flatnonzero(np.isin(path, border))
-        path = path[: int(on_border[0]) + 1] if len(on_border) else path
-        if len(path) > 1:
-            flat = slit_to(flat, path, table)
-    return flat.surface
-
-
-def detour(edges: NDArray[np.float64], slit: Slit) -> NDArray[np.float64]:
-    """(e,) ≥ 1: how much dearer edges (e, 2, 3) are the farther they lie from a slit, in steps of its own points."""
-    step = slit.length / max(len(slit.points) - 1, 1)
-    if step <= 0.0:
-        return np.ones(len(edges))
-    t = np.linspace(0.0, 1.0, 4, endpoint=False)[None, :, None]
-    along = (slit.points[:-1, None] * (1.0 - t) + slit.points[1:, None] * t).reshape(-1, 3)
-    distance = KDTree(np.concatenate([along, slit.points[-1:]])).query(edges.mean(axis=1))[0]
-    return 1.0 + (distance / step) ** 2
 
 
 def slit_where_it_pays(flat: Flat, total_area: float, config: SlitConfig) -> tuple[Flat, tuple[Slit, ...]]:

@@ -27,8 +27,9 @@ from ..config import FinishConfig
 from ..finish.contact import Relaxed, excess_energy, relax
 from ..finish.disks import cut_open
 from ..finish.flatten import circle_map
+from ..finish.openings import slit_along
 from ..finish.pieces import Piece, border_length
-from ..finish.slits import Flat, Slit, slit_along, slit_where_it_pays
+from ..finish.slits import Flat, Slit, slit_where_it_pays
 from ..search.charts import Finished
 from ..search.labels import connected_pieces, dual_graph
 from ..search.proof import verify

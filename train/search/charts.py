@@ -15,9 +15,8 @@ import numpy as np
 
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
-from ..finish.contact import excess_energy
 from ..finish.fallback import unwrapped_by_xatlas
-from ..finish.pieces import Piece, border_length, extract
+from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
 from ..workers import one_thread_each, parallel_map
 from .carry import carried_back
@@ -317,6 +316,4 @@ def as_piece(surface: Surface, development: Development) -> Piece:
     index[order] = np.cumsum(fresh) - 1
     first = order[fresh]
     flat = Flat(Surface(surface.vertices[corner[first]], index.reshape(-1, 3)), uv[first], {})
-    whole = extract(surface, development.ids)
-    slits = (border_length(flat.surface) - border_length(whole)) / 2.0
-    return Piece(development.ids, flat, excess_energy(flat.surface, flat.uv), slits)
+    return measured(surface, development.ids, flat, 1.0)

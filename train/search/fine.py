@@ -6,6 +6,7 @@ conjugate gradients with the twin as coarse level lay it out: no factorization a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,14 +18,16 @@ from ...runtime.geometry.overlap import overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, edge_table
 from ...runtime.mesh import Surface
 from ..finish.arap import RigidSteps, evened_out, nearest_rotations
-from ..finish.contact import boundary_edges, excess_energy, rim_faces
+from ..finish.contact import boundary_edges, rim_faces
 from ..finish.flatten import Pins, jacobians
-from ..finish.pieces import Piece, border_length, extract, openings
-from ..finish.slits import Flat, slit_along
+from ..finish.openings import openings, slit_along
+from ..finish.pieces import Piece, extract, measured
+from ..finish.slits import Flat
 from ..finish.twolevel import TwoLevel
 from ..workers import parallel_map
-from .carry import carried_jacobians, fragments_joined, nearest_faces, smoothed_in_band, votes
+from .carry import fragments_joined, smoothed_in_band, votes
 from .labels import dual_graph
+from .layout import carried_jacobians, nearest_faces
 from .search import Search
 
 if TYPE_CHECKING:
@@ -44,7 +47,7 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     areas = surface.face_areas()
     smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
-    joined = fragments_joined(smooth, areas, graph)
+    joined = fragments_joined(smooth, areas, graph, config.carry.islet)
     groups = [np.flatnonzero(joined == number) for number in range(int(joined.max()) + 1)]
     twins = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
@@ -56,6 +59,8 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
             continue
         search = search or Search(surface, graph, config)
         search.add_valid(groups[number], twins[number].slits)
+    if search is not None:
+        search.place_loose()
     return [piece for piece in found if piece is not None] + ([] if search is None else list(search.pieces.values()))
 
 
@@ -63,14 +68,13 @@ def refined_piece(
     surface: Surface, ids: NDArray[np.int64], twin: Piece, total: float, config: FinishConfig
 ) -> Piece | None:
     """The faces ids (m,) laid out like their twin, of lowest cost; None where no way to open them is valid so."""
-    whole, unit = extract(surface, ids), float(np.sqrt(total))
+    whole = extract(surface, ids)
     best: Piece | None = None
     for disk in opened_alike(whole, twin, config):
         uv = laid_out(disk, twin.flat, config)
         if uv is None:
             continue
-        length = (border_length(disk) - border_length(whole)) / 2.0 / unit
-        piece = Piece(ids, Flat(disk, uv, {}), excess_energy(disk, uv) / total, length, twin.slits, twin.resort)
+        piece = replace(measured(surface, ids, Flat(disk, uv, {}), total, twin.slits), resort=twin.resort)
         if best is None or piece.cost(config.slit.price) < best.cost(config.slit.price):
             best = piece
     allowed = config.carry.worse * twin.energy + config.carry.slack * float(whole.face_areas().sum()) / total
@@ -79,7 +83,8 @@ def refined_piece(
 
 def opened_alike(whole: Surface, twin: Piece, config: FinishConfig) -> Iterator[Surface]:
     """The ways to open a piece that leave as many borders as its twin has; all ways where none does."""
-    ways = [slit_along(way, twin.slits, config.slit) for way in openings(whole, config.slit.seams)]
+    slit = slit_along(whole, twin.slits, config.slit)
+    ways = [opening.disk for opening in openings(slit, config.slit.seams)]
     loops = len(boundary_loops(twin.flat.surface.faces))
     alike = [way for way in ways if len(boundary_loops(way.faces)) == loops]
     yield from alike or ways

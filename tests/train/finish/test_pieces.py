@@ -10,7 +10,6 @@ import pytest
 
 pytest.importorskip("igl")
 
-from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, components, euler_characteristic, is_manifold
 from flexpara.runtime.geometry.triangles import signed_areas
@@ -26,7 +25,6 @@ from flexpara.train.finish.pieces import (
     extract,
     flattened,
     make_piece,
-    openings,
     slit_further,
     try_piece,
 )
@@ -111,36 +109,6 @@ def test_the_border_of_one_side_of_a_cube_is_four_edges_and_of_the_whole_none() 
     assert border_length(cube) == 0.0
 
 
-def test_a_disk_opens_as_it_is() -> None:
-    cone = sample("cone", 16)
-    (only,) = openings(cone, SeamPrices())
-    assert only is cone
-
-
-def test_a_ring_opens_as_it_is_or_cut_through() -> None:
-    tube = sample("tube", 16)
-    kept, cut = openings(tube, SeamPrices())
-    assert kept is tube
-    assert euler_characteristic(cut.faces) == 1
-    assert border_length(cut) == pytest.approx(border_length(tube) + 2.0 * 2.0)
-
-
-@pytest.mark.parametrize("name", ["sphere", "torus", "gyroid"])
-def test_a_closed_surface_opens_in_one_way(name: str) -> None:
-    if name == "gyroid":
-        pytest.importorskip("manifold3d")
-    (cut,) = openings(sample(name, 24), SeamPrices())
-    assert euler_characteristic(cut.faces) == 1
-    assert len(boundary_loops(cut.faces)) == 1
-
-
-def test_a_handle_with_a_hole_is_cut() -> None:
-    torus = sample("torus", 24)
-    pierced = extract(torus, where(np.linalg.norm(torus.triangles.mean(axis=1) - [1.0, 0, 0], axis=1) > 0.2))
-    (cut,) = openings(pierced, SeamPrices())
-    assert euler_characteristic(cut.faces) == 1
-
-
 def test_a_tube_is_cut_open_and_becomes_flat() -> None:
     tube = sample("tube", 24)
     piece = whole_piece(tube)
@@ -170,7 +138,7 @@ def test_any_solid_is_one_valid_piece_or_the_overlap_that_keeps_it_from_being_on
     if isinstance(found, Piece):
         assert_valid(found, surface)
     elif found is not None:
-        corners = found.uv[found.faces]
+        corners = found.flat.uv[found.flat.surface.faces]
         assert not flipped_triangles(corners).any()
         assert len(found.pairs()) > 0
         assert {tuple(pair) for pair in found.pairs().tolist()} <= {

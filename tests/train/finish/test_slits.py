@@ -14,7 +14,6 @@ from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pai
 from flexpara.runtime.geometry.topology import (
     EdgeTable,
     boundary_loops,
-    components,
     edge_table,
     euler_characteristic,
     is_manifold,
@@ -32,7 +31,6 @@ from flexpara.train.finish.slits import (
     candidate_paths,
     most_stressed,
     path_length,
-    slit_along,
     slit_to,
     slit_where_it_pays,
     stress,
@@ -294,37 +292,3 @@ def test_size_does_not_matter() -> None:
     open_, slits = slit_further(flattened(small))
     assert len(slits) == len(slit_further(flattened(sock(24, 1.0)))[1])
     assert_valid(open_)
-
-
-def test_slits_repeat_on_a_finer_mesh_of_the_same_shape() -> None:
-    coarse = flattened(sock(20, 1.0))
-    open_, slits = slit_further(coarse)
-    assert len(slits) > 1
-    assert border_length(slit_along(coarse.surface, slits, CONFIG)) == pytest.approx(border_length(open_.surface))
-    fine = sock(40, 1.0)
-    again = slit_along(fine, slits, CONFIG)
-    assert np.array_equal(again.triangles, fine.triangles)
-    assert euler_characteristic(again.faces) == 1
-    assert len(boundary_loops(again.faces)) == 1
-    assert border_length(again) - border_length(fine) == pytest.approx(
-        border_length(open_.surface) - border_length(coarse.surface), rel=0.2
-    )
-    assert excess(flattened(again)) < 0.1 * excess(flattened(fine))
-
-
-@pytest.mark.parametrize("target", [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
-def test_slitting_along_nothing_or_the_border_changes_nothing(target: list[float]) -> None:
-    cone = sample("cone", 24)
-    start = [0.5, 0.0, 0.0]
-    assert np.array_equal(slit_along(cone, (), CONFIG).faces, cone.faces)
-    assert np.array_equal(slit_along(cone, (Slit(np.array([start, target])),), CONFIG).faces, cone.faces)
-
-
-def test_a_slit_that_would_run_along_the_border_leaves_it_where_it_must() -> None:
-    """From one end of a ribbon to the other, just inside its rim: the shortest way is the rim itself."""
-    cloth = flat_sheet(16)
-    ribbon = Surface(cloth.vertices * [1.0, 0.2, 0.0], cloth.faces)
-    slit = slit_along(ribbon, (Slit(np.array([[-1.0, -0.2, 0.0], [0.8, -0.16, 0.0]])),), CONFIG)
-    assert euler_characteristic(slit.faces) == 1
-    assert components(slit.faces).max() == 0
-    assert border_length(ribbon) < border_length(slit) < border_length(ribbon) + 2.0 * 1.9

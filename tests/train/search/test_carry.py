@@ -18,14 +18,12 @@ from flexpara.train.finish.flatten import flatten
 from flexpara.train.finish.slits import Flat
 from flexpara.train.search.carry import (
     carried_back,
-    carried_uv,
-    face_frames,
     fragments_joined,
     smoothed_in_band,
-    turned_into,
     votes,
 )
 from flexpara.train.search.labels import DualGraph, connected_pieces, dual_graph
+from flexpara.train.search.layout import carried_uv, face_frames, turned_into
 from flexpara.train.search.proxy import simplified
 from flexpara.train.search.search import Search
 
@@ -100,20 +98,34 @@ def test_only_faces_near_a_border_change_sides() -> None:
     assert seams[1] < seams[0]
 
 
+def is_same_partition(a: np.ndarray, b: np.ndarray) -> bool:
+    return len(np.unique(np.stack([a, b]), axis=1).T) == len(np.unique(a)) == len(np.unique(b))
+
+
 def test_fragments_join_the_neighbour_they_share_most_border_with() -> None:
     sphere = sample("sphere", 24)
     height = sphere.triangles.mean(axis=1)[:, 2]
     label = (height > 0.0).astype(np.int64)
     label[height.argmax()] = 0  # a fragment of the lower half within the upper
-    joined = fragments_joined(label, sphere.face_areas(), graph_of(sphere))
-    assert np.array_equal(joined, (height > 0.0).astype(np.int64))
+    joined = fragments_joined(label, sphere.face_areas(), graph_of(sphere), 0.01)
+    assert is_same_partition(joined, (height > 0.0).astype(np.int64))
     assert connected_pieces(joined, graph_of(sphere)).max() == 1
+
+
+def test_a_large_fragment_stays_a_piece_of_its_own() -> None:
+    sphere = sample("sphere", 24)
+    height = sphere.triangles.mean(axis=1)[:, 2]
+    label = (height > 0.0).astype(np.int64)
+    label[height > 0.8] = 0
+    joined = fragments_joined(label, sphere.face_areas(), graph_of(sphere), 0.01)
+    assert int(joined.max()) == 2
+    assert len(np.unique(joined[height > 0.8])) == 1
 
 
 def test_labels_without_fragments_are_only_renumbered() -> None:
     sphere = sample("sphere", 24)
     half = (sphere.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64)
-    assert np.array_equal(fragments_joined(3 + 4 * half, sphere.face_areas(), graph_of(sphere)), half)
+    assert is_same_partition(fragments_joined(3 + 4 * half, sphere.face_areas(), graph_of(sphere), 0.01), half)
 
 
 def test_the_frame_of_a_face_is_orthonormal_and_right_handed() -> None:

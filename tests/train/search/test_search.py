@@ -15,8 +15,8 @@ from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FinishConfig
-from flexpara.train.finish.pieces import Piece
-from flexpara.train.search import search as module
+from flexpara.train.finish.flaps import Trimmed
+from flexpara.train.search import state as module
 from flexpara.train.search.labels import connected_pieces, dual_graph
 from flexpara.train.search.search import Search
 
@@ -90,7 +90,7 @@ def test_a_merge_gains_what_the_objective_says() -> None:
     search = search_of(sphere, bands(sphere, 4))
     before, merge = search.objective(), search.best_merge(-np.inf)
     assert merge is not None
-    search.apply_merge(merge)
+    assert search.apply_merge(merge, -np.inf)
     assert before - search.objective() == pytest.approx(merge.gain, abs=1e-9)
     assert_valid(search)
 
@@ -101,8 +101,8 @@ def test_a_split_gains_what_the_objective_says() -> None:
     key, piece = next(iter(search.pieces.items()))
     before, split = search.objective(), search.best_split(piece)
     assert split is not None
-    search.apply_split(key, split[1])
-    assert before - search.objective() == pytest.approx(split[0], abs=1e-9)
+    assert search.exchange([key], split.parts, -np.inf, 9)
+    assert before - search.objective() == pytest.approx(split.gain, abs=1e-9)
     assert_valid(search)
 
 
@@ -126,7 +126,7 @@ def test_what_curvature_foretells_of_a_merge_orders_what_flattening_finds() -> N
     search = search_of(sphere, bands(sphere, 6))
     pairs = list(search.borders())
     search.try_merges(pairs)
-    found = [(search.foretell(pair), piece.cost(search.price)) for pair in pairs if (piece := search.tried[pair])]
+    found = [(search.foretell(pair)[0], search.cost(merged)) for pair in pairs if (merged := search.tried[pair])]
     foretold, cost = np.array(found).T
     assert np.corrcoef(np.argsort(np.argsort(foretold)), np.argsort(np.argsort(cost)))[0, 1] > 0.5
 
@@ -168,13 +168,53 @@ def test_what_no_flattening_makes_valid_goes_to_xatlas(monkeypatch: pytest.Monke
     assert {piece.method for piece in search.pieces.values()} == {"xatlas"}
 
 
-def test_a_piece_that_stretches_too_much_to_start_from_is_cut() -> None:
+def test_a_piece_that_stretches_too_much_is_split_before_others_are_merged() -> None:
     sphere = unit("sphere", 24)
-    whole = np.zeros(len(sphere.faces), dtype=np.int64)
-    found = search_of(sphere).try_piece(np.arange(len(sphere.faces)))
-    assert isinstance(found, Piece)
-    strict = replace(CONFIG, bearable=0.5 * found.energy)
-    assert len(search_of(sphere, whole, strict).pieces) > len(search_of(sphere, whole).pieces)
+    search = search_of(sphere, np.zeros(len(sphere.faces), dtype=np.int64), replace(CONFIG, stretched=1e-3))
+    (whole,) = search.pieces.values()
+    assert search.is_stretched(whole)
+    before = search.objective()
+    search.split_stretched()
+    assert len(search.pieces) > 1
+    assert search.objective() < before
+    assert_valid(search)
+
+
+def test_a_part_of_a_piece_is_valid_and_no_dearer_than_as_it_lies_there() -> None:
+    sphere = unit("sphere", 24)
+    search = search_of(sphere, np.zeros(len(sphere.faces), dtype=np.int64))
+    (whole,) = search.pieces.values()
+    ids = np.flatnonzero(sphere.triangles.mean(axis=1)[:, 2] > 0.0)
+    part = search.part(whole, ids)
+    assert sorted(part.piece.ids.tolist()) == ids.tolist()
+    assert part.piece.energy < whole.energy
+
+
+def test_an_exchange_that_does_not_pay_changes_nothing() -> None:
+    tube = unit("tube", 24)
+    search = search_of(tube, bands(tube, 3))
+    before = dict(search.pieces)
+    key, piece = next(iter(search.pieces.items()))
+    assert not search.exchange([key], [Trimmed(piece, (), 0.0)], 0.0, 9)
+    assert search.pieces == before
+    assert not search.exchange([key], [Trimmed(piece, (), 0.0)], -1.0, 2)
+    assert search.pieces == before
+
+
+def test_a_flap_finds_a_place_beside_it() -> None:
+    sphere = unit("sphere", 24)
+    search = search_of(sphere, bands(sphere, 2))
+    label = search.label()
+    owner = int(label[0])
+    pairs = search.graph.pairs
+    rim = pairs[(label[pairs[:, 0]] != label[pairs[:, 1]])].reshape(-1)
+    flap = rim[label[rim] == owner][:1]
+    piece = search.pieces.pop(owner)
+    rest = piece.ids[~np.isin(piece.ids, flap)]
+    search.add_trimmed(Trimmed(search.part(piece, rest).piece, (flap,), 0.0))
+    search.place_loose()
+    assert len(search.pieces) == 2
+    assert_valid(search)
 
 
 def test_slits_are_made_where_they_pay_and_only_in_dear_pieces() -> None:

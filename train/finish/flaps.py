@@ -1,0 +1,174 @@
+"""Faces taken off a flattened piece where it lies over itself, and put on to another.
+
+Most pieces that overlap do so by a few faces along a jagged border: a flap.  m faces of a piece.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
+from ...runtime.mesh import Surface
+from .contact import boundary_edges, rim_overlaps
+from .pieces import measured
+from .slits import Flat
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.geometry.topology import EdgeTable
+    from .pieces import Overlapping, Piece
+
+
+def flap_faces(uv: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) bool: faces without which nothing overlaps: one of each pair, that of most pairs, then of least area.
+
+    uv: (m, 3, 2) corners, no face flipped.  areas: (m,).
+    """
+    pairs = overlapping_pairs(uv)
+    off = np.zeros(len(uv), dtype=bool)
+    while len(pairs):
+        faces, count = np.unique(pairs, return_counts=True)
+        off[faces[np.lexsort((areas[faces], -count))[0]]] = True
+        pairs = pairs[~off[pairs].any(axis=1)]
+    return off
+
+
+class Trimmed(NamedTuple):
+    """A piece without its flaps.  flaps: faces of each connected one.  rim: length of the cuts that took them off."""
+
+    piece: Piece
+    flaps: tuple[NDArray[np.int64], ...]
+    rim: float
+
+
+def trimmed(surface: Surface, found: Overlapping, total_area: float, most: float) -> Trimmed | None:
+    """A flattening less the faces that lie over others; None where they are more than the share ``most`` of its area.
+
+    What loses its hold on the rest with them goes too.
+    """
+    faces, areas = found.flat.surface.faces, found.flat.surface.face_areas()
+    off = flap_faces(found.flat.uv[faces], areas)
+    table = edge_table(faces)
+    uncut = table.manifold & (off[table.edge_faces[:, 0]] == off[table.edge_faces[:, 1]])
+    part = face_components(len(faces), table.edge_faces[uncut])
+    kept = np.flatnonzero(part == np.bincount(part, areas).argmax())
+    if areas[kept].sum() < (1.0 - most) * areas.sum():
+        return None
+    off = part != part[kept[0]]
+    joined = table.manifold & off[table.edge_faces].all(axis=1)
+    flap = face_components(len(faces), table.edge_faces[joined])
+    rim = table.manifold & (off[table.edge_faces[:, 0]] != off[table.edge_faces[:, 1]])
+    ends = found.flat.surface.vertices[table.edges[rim]]
+    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) / float(np.sqrt(total_area))
+    piece = measured(surface, found.ids[kept], restricted(found.flat, kept), total_area, found.slits)
+    flaps = tuple(found.ids[flap == number] for number in np.unique(flap[off]))
+    return Trimmed(piece, flaps, length)
+
+
+def restricted(flat: Flat, rows: NDArray[np.int64]) -> Flat:
+    """A part of a flattening: the faces at ``rows``, where they are."""
+    faces, old = split_non_manifold_vertices(flat.surface.faces[rows])
+    return Flat(Surface(flat.surface.vertices[old], faces), flat.uv[old], {})
+
+
+def attached(
+    piece: Piece, surface: Surface, table: EdgeTable, flap: NDArray[np.int64], tries: int
+) -> tuple[NDArray[np.int64], Flat] | None:
+    """The faces of a piece and a flap, and the flap laid beside the piece, face after face, at their own size.
+
+    At first a flap is joined to all that it touches, its faces between others taking their corners; where that overlaps
+    or flips, along one edge alone, up to ``tries`` of them, longest first.  Nothing else moves.  None where no way is
+    valid.  table: of the surface.
+    """
+    edges = table.face_edges[flap]
+    touching = np.isin(table.edge_faces[edges], piece.ids).any(axis=2)
+    ends = surface.vertices[table.edges[edges]]
+    length = np.where(touching, np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), 0.0)
+    longest = np.argsort(-length, axis=None, kind="stable")[: min(tries, int(touching.sum()))].tolist()
+    for only in [None, *edges.reshape(-1)[longest].tolist()]:
+        layout = _Layout(piece, surface, table, only)
+        if (order := layout.add_all(flap)) is not None and is_valid(flat := layout.flat(), len(order)):
+            return np.concatenate([piece.ids, np.array(order, dtype=np.int64)]), flat
+    return None
+
+
+def is_valid(flat: Flat, fresh: int) -> bool:
+    """True where the last ``fresh`` faces of a flattening are not flipped, and its border does not cross itself."""
+    faces = flat.surface.faces
+    flipped = flipped_triangles(flat.uv[faces[-fresh:]]).any()
+    return not flipped and not rim_overlaps(faces, boundary_edges(faces), flat.uv)
+
+
+class _Layout:
+    """A flattening that grows face by face: corners (m, 3) of each face as rows of points in space and in the plane.
+
+    only: the one edge at which it may grow beyond the piece, or None for all.
+    """
+
+    def __init__(self, piece: Piece, surface: Surface, table: EdgeTable, only: int | None) -> None:
+        self.surface, self.table, self.only = surface, table, only
+        self.row = {face: row for row, face in enumerate(piece.ids.tolist())}
+        self.faces = piece.flat.surface.faces.tolist()
+        self.laid = len(self.faces)
+        self.points = [piece.flat.surface.vertices]
+        self.uv = piece.flat.uv.tolist()
+        self.more: list[int] = []
+
+    def add_all(self, flap: NDArray[np.int64]) -> list[int] | None:
+        """Lay all faces of a flap out, those with most neighbours first; their order, None where one has none."""
+        left, order = set(flap.tolist()), []
+        while left:
+            glued = {face: self.neighbours(face) for face in sorted(left)}
+            face = max(glued, key=lambda face: len(glued[face]))
+            if not glued[face]:
+                return None
+            self.add(face, glued[face])
+            left.remove(face)
+            order.append(face)
+        return order
+
+    def neighbours(self, face: int) -> list[tuple[int, int, int]]:
+        """(corner, and the points that this corner and the next one would take) for each edge at a face laid out."""
+        found = []
+        for corner, edge in enumerate(self.table.face_edges[face].tolist()):
+            rows = [self.row[other] for other in self.table.edge_faces[edge].tolist() if other in self.row]
+            if not rows or (rows[0] < self.laid and self.only not in (None, edge)):
+                continue
+            a, b = self.surface.faces[face, [corner, (corner + 1) % 3]].tolist()
+            other = next(f for f in self.table.edge_faces[edge].tolist() if f in self.row)
+            ends, mine = self.surface.faces[other].tolist(), self.faces[rows[0]]
+            found.append((corner, mine[ends.index(a)], mine[ends.index(b)]))
+        return found
+
+    def add(self, face: int, glued: list[tuple[int, int, int]]) -> None:
+        """Lay a face out beside those that it is glued to."""
+        corners = [-1, -1, -1]
+        for corner, first, second in glued:
+            corners[corner], corners[(corner + 1) % 3] = first, second
+        if -1 in corners:
+            free = corners.index(-1)
+            corners[free] = len(self.uv)
+            self.uv.append(self._apex(face, free, corners[(free + 1) % 3], corners[(free + 2) % 3]))
+            self.more.append(int(self.surface.faces[face, free]))
+        self.row[face] = len(self.faces)
+        self.faces.append(corners)
+
+    def _apex(self, face: int, free: int, first: int, second: int) -> list[float]:
+        """The place of the corner ``free``, left of the way from its next corner to the one after, to scale."""
+        apex, a, b = self.surface.vertices[self.surface.faces[face, [free, (free + 1) % 3, (free + 2) % 3]]]
+        along = b - a
+        length = max(float(along @ along), 1e-300)
+        t = float((apex - a) @ along) / length
+        height = float(np.linalg.norm(apex - a - t * along)) / np.sqrt(length)
+        (ax, ay), (bx, by) = self.uv[first], self.uv[second]
+        dx, dy = bx - ax, by - ay
+        return [ax + t * dx - height * dy, ay + t * dy + height * dx]
+
+    def flat(self) -> Flat:
+        """What was laid out."""
+        points = np.concatenate([self.points[0], self.surface.vertices[self.more]])
+        return Flat(Surface(points, np.array(self.faces, dtype=np.int64)), np.array(self.uv), {})
