@@ -230,6 +230,7 @@ class UnwrapResult:
         from .bake.checks import check_outputs, chosen_maps
         from .bake.output import BakeJob, texture_notes, write_outputs, written_notes
         from .export.assemble import invert
+        from .runtime.io.changes import lost, told
         from .runtime.progress import Clock
 
         outputs = outputs.for_asset(self.asset)
@@ -237,7 +238,7 @@ class UnwrapResult:
         maps = chosen_maps(outputs, seed=self.report["settings"]["seed"])
         check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
-        report["changes"] = {**report["changes"], **outputs.lost(self.asset)}
+        report["changes"] = {**report["changes"], **lost(self.asset, outputs)}
         networks = {"onnx": self.onnx}
         if self.found.paper is not None:
             networks["paper.onnx"] = self.found.paper
@@ -250,7 +251,11 @@ class UnwrapResult:
         apart = report["metrics"]["overlap_fraction"] == 0.0
         job = BakeJob.of(self.atlas, self.asset, outputs, maps)
         report |= write_outputs(output, job, clock, apart=apart)
+        if cut := report.pop("polygons_cut"):
+            report["changes"]["polygons_cut"] = cut
         if note is not None:
+            for fact in told({"polygons_cut": cut}):
+                note(f"{self.asset.stem}: {fact}")
             for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}

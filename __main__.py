@@ -109,16 +109,16 @@ def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
 def _perform(run: Run, console: Console) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
+    from .runtime.io.changes import lost
     from .runtime.mesh import Asset
 
     chosen_maps(run.outputs)
     with console.progress() as progress:
         source = load_any(run.mesh)
-        if isinstance(source, Asset):  # of points more is known when triangles lie over them
-            console.note_changes(source, run.outputs.lost(source))
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
             if isinstance(source, Asset):
                 outputs = run.outputs.for_asset(source)
+                console.note_changes(source, lost(source, outputs))
                 check_outputs(folder, outputs, chosen_maps(outputs))
             run.save()
             if isinstance(source, Asset):
@@ -195,11 +195,12 @@ def export(
     margin = replace(options, padding=_padding(options, outputs)).margin
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
+    from .runtime.io.changes import lost
 
     asset = load(mesh)
-    console.note_changes(asset, outputs.lost(asset))
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
         outputs = outputs.for_asset(asset)
+        console.note_changes(asset, lost(asset, outputs))
         check_outputs(folder, outputs, chosen_maps(outputs))
         with requires("train"):
             from .export.assemble import assemble

@@ -8,19 +8,17 @@ from __future__ import annotations
 import tempfile
 import warnings
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import MissingDependencyError
-from ..runtime.extras import requires
-from ..runtime.io.gltf.instances import every_instance
-from ..runtime.material import used_materials
-from ..runtime.options import SCENES
+from ..runtime.io.loops import loops_of
+from ..runtime.options import POLYGONS
 from .checks import exr_settings
+from .meshes import MeshJob, write_meshes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
@@ -31,8 +29,6 @@ if TYPE_CHECKING:
 
 LARGE = 8192
 """Side from which images are kept on disk while they are baked."""
-USD_KEYS = {"orm": "occlusionRoughnessMetallic"}
-"""Products of the USD preset that have another name among flexpara's own maps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +62,13 @@ def write_outputs(output: OutputFolder, job: BakeJob, clock: Clock, *, apart: bo
     """
     baked = bake_textures(output, job, clock)
     with clock.stage("write"):
-        written = write_meshes(output, job.atlas, job.asset, job.outputs, baked, apart=apart)
+        files = MeshJob(job.atlas, job.asset, job.outputs, baked.textures, baked.files)
+        written = write_meshes(output, files, apart=apart)
     if job.outputs.preview:
         with clock.stage("preview"):
             _write_preview(output, job.atlas, job.asset)
-    return {"textures": texture_facts(job.atlas, baked), "written": written}
+    cut = loops_of(job.atlas, job.asset).cut if set(POLYGONS) & set(job.outputs.formats) else 0
+    return {"textures": texture_facts(job.atlas, baked), "written": written, "polygons_cut": cut}
 
 
 def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
@@ -132,85 +130,6 @@ def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asse
     kind = outputs.texture_format
     output.write_several(lambda folder: write_textures(textures, folder, stem, file_type=kind))
     return texture_names(textures, stem, file_type=kind)
-
-
-def write_meshes(
-    output: OutputFolder, atlas: Atlas, asset: Asset, outputs: Outputs, baked: Baked, *, apart: bool = False
-) -> dict[str, dict[str, Any]]:
-    """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
-    from .files.written import Reading, parts_of, written_report
-
-    asset = _as_scene(asset, outputs)
-    spread, own = every_instance(atlas, asset)
-    writers: dict[str, Callable[[Path], None]] = {
-        "glb": lambda path: _write_gltf(atlas, asset, baked, path, outputs.uv_set),
-        "gltf": lambda path: _write_gltf(atlas, asset, baked, path, outputs.uv_set),
-        "obj": lambda path: _write_obj(spread, baked, path),
-        "ply": lambda path: _write_ply(spread, asset, path),
-        "usda": lambda path: _write_usda(spread, asset, baked, path),
-    }
-    staged: dict[str, Path] = {}
-
-    def write(kind: str, path: Path) -> None:
-        writers[kind](path)
-        staged[kind] = path
-
-    for kind in (name for name in writers if name in outputs.formats):
-        output.write(f"{output.stem}.{kind}", partial(write, kind))
-    uv = atlas.uv[atlas.faces]
-    order, parts = parts_of(asset, outputs.uv_set or 0)
-    scenes = {kind: path for kind, path in staged.items() if kind in SCENES}
-    plain = {kind: path for kind, path in staged.items() if kind not in SCENES}
-    return {
-        **written_report(scenes, uv[order], Reading(apart=apart, parts=parts)),
-        **written_report(plain, uv, Reading(apart=apart, faces=own)),
-    }
-
-
-def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
-    """With a document for what is written as one: several materials, or uv that go beside others."""
-    wanted = outputs.uv_set is not None or len(used_materials(asset)) > 1
-    if asset.document is not None or not wanted or set(SCENES).isdisjoint(outputs.formats):
-        return asset
-    with requires("bake"):
-        from .files.gltfmade import with_document
-    return with_document(asset)
-
-
-def _write_gltf(atlas: Atlas, asset: Asset, baked: Baked, path: Path, uv_set: int | None) -> None:
-    """A .glb or .gltf file: the document with new uv, where there is one."""
-    with requires("bake"):
-        from .files.gltf import write_glb
-        from .files.gltfscene import Page, write_scene
-    if asset.document is None:
-        write_glb(atlas, asset, baked.textures, path)
-    else:
-        write_scene([Page(atlas, asset, baked.textures, uv_set)], path)
-
-
-def _write_obj(atlas: Atlas, baked: Baked, path: Path) -> None:
-    """With a material that names the base colour, or what stands for it."""
-    from ..runtime.io.obj.write import write_obj
-
-    shown = next((baked.files[name] for name in ("base-color", "uv-checker", "chart") if name in baked.files), None)
-    write_obj(atlas, path, texture=shown)
-
-
-def _write_ply(atlas: Atlas, asset: Asset, path: Path) -> None:
-    """With the source's vertex colours."""
-    from ..runtime.io.ply.write import write_ply
-
-    write_ply(atlas, path, colors=asset.colors)
-
-
-def _write_usda(atlas: Atlas, asset: Asset, baked: Baked, path: Path) -> None:
-    """With a material that names the texture files beside it."""
-    with requires("bake"):
-        from .files.usd import write_usda
-    color = baked.textures.get("base-color")
-    alpha = color is not None and color.pixels.shape[2] == 4
-    named = {USD_KEYS.get(name, name): file for name, file in baked.files.items()}
-    write_usda(atlas, asset, named, path, alpha=alpha)
 
 
 def texture_facts(atlas: Atlas, baked: Baked) -> dict[str, Any]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .io.gltf.document import Document
+    from .io.obj.text import ObjText
     from .material import Material
 
 
@@ -72,6 +73,28 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
+class Polygons:
+    """What the triangles of a mesh were in its file.
+
+    corner: (f, 3) int64, the place of each corner in the list of the corners of all polygons.  size: (p,) int64,
+    corners of each polygon, in their order; some may have no triangle.
+    """
+
+    corner: NDArray[np.int64]
+    size: NDArray[np.int64]
+
+    @property
+    def of_faces(self) -> NDArray[np.int64]:
+        """(f,) int64: the polygon of each triangle."""
+        return np.searchsorted(np.cumsum(self.size), self.corner[:, 0], side="right")
+
+    @property
+    def large(self) -> int:
+        """How many have over three corners."""
+        return int(np.count_nonzero(self.size > 3))
+
+
+@dataclass(frozen=True, eq=False)
 class Asset:
     """A mesh file, cleaned: the file's own vertices (split as the file splits them) and the welded surface beneath.
 
@@ -82,7 +105,8 @@ class Asset:
     sha256: hex digest of the source file's bytes ("" when made in memory).  stem: base name for outputs.
     document: the scene that the mesh is the surface of, each of its meshes once; None for a file that holds nothing
     but a mesh.  part: (f,) int64, the part of it that each face is in; origin: (n,) int64, the vertex of that part that
-    each file vertex is; both None without a document.
+    each file vertex is; both None without a document.  polygons: what the triangles were, None for a format of
+    triangles.  obj: the text of an OBJ file.
     """
 
     positions: NDArray[np.float64]
@@ -100,6 +124,8 @@ class Asset:
     part: NDArray[np.int64] | None = None
     origin: NDArray[np.int64] | None = None
     document: Document | None = None
+    polygons: Polygons | None = None
+    obj: ObjText | None = None
 
 
 @dataclass(frozen=True, eq=False)

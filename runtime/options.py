@@ -34,6 +34,8 @@ ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirect
 FORMATS = ("glb", "gltf", "obj", "ply", "usda")
 SCENES = ("glb", "gltf")
 """Formats that hold scenes."""
+POLYGONS = ("obj", "ply", "usda")
+"""Formats that hold polygons of more than three corners."""
 LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
@@ -264,12 +266,6 @@ class Outputs(FileOptions, MapOptions):
         refuse_unread(asset, maps)
         drawn = bool(self.maps) if self.preview is None else self.preview
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
-
-    def lost(self, asset: "Asset") -> dict[str, int]:
-        """What is in the file of the mesh and in nothing that will be written, name → count."""
-        if asset.document is None or not set(SCENES).isdisjoint(self.formats):
-            return {}
-        return asset.document.beyond_meshes()
 
     def for_points(self) -> "Outputs":
         """The same without the triangles as ply, whose name the points have; glb where that leaves none."""

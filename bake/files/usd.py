@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.io.loops import Loops, loops_of
 from ...runtime.material import Material, used_materials
 from ..maps.material import emissive_strength
 
@@ -69,7 +70,7 @@ def Xform "{root}" (
         prepend apiSchemas = ["MaterialBindingAPI"]
     )
     {{
-{_mesh_lines(atlas)}
+{_mesh_lines(atlas, loops_of(atlas, asset))}
         rel material:binding = </{root}/material>
         uniform token subdivisionScheme = "none"
     }}
@@ -85,14 +86,14 @@ def prim_name(text: str) -> str:
     return f"_{plain}" if plain[0].isdigit() else plain
 
 
-def _mesh_lines(atlas: Atlas) -> str:
+def _mesh_lines(atlas: Atlas, loops: Loops) -> str:
     """Attributes of the mesh."""
     low, high = atlas.positions.min(axis=0), atlas.positions.max(axis=0)
-    counts = ", ".join(["3"] * len(atlas.faces))
+    counts = ", ".join(map(str, loops.size.tolist()))
     lines = [
         f"float3[] extent = [{_tuples(np.stack([low, high]))}]",
         f"int[] faceVertexCounts = [{counts}]",
-        f"int[] faceVertexIndices = [{', '.join(map(str, atlas.faces.reshape(-1).tolist()))}]",
+        f"int[] faceVertexIndices = [{', '.join(map(str, loops.vertex.tolist()))}]",
         f"point3f[] points = [{_tuples(atlas.positions)}]",
         f'normal3f[] normals = [{_tuples(atlas.normals)}] (\n            interpolation = "vertex"\n        )',
         f'texCoord2f[] primvars:st = [{_tuples(atlas.uv)}] (\n            interpolation = "vertex"\n        )',

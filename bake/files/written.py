@@ -17,6 +17,7 @@ import numpy as np
 
 from ...runtime.errors import MeshError
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.io.polygons import fans
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -62,12 +63,14 @@ class Reading:
     """What is read of files.
 
     apart: whether no two triangles are known to overlap; files that hold the same are not tested again.
-    parts: of glTF files, in the order of the faces.  faces: (f,) int64 of other files, None is all of them.
+    parts: of glTF files, in the order of the faces.  fans: (g, 3, 2) uv of other files, whose polygons are read as fans
+    from their first corner; None where all are triangles.  faces: (f,) int64 of triangles in them, None is all.
     most: faces of a file that is read.
     """
 
     apart: bool = False
     parts: Sequence[PartUv] = (PartUv(),)
+    fans: NDArray[np.float32] | None = None
     faces: NDArray[np.int64] | None = None
     most: int = READ_BACK
 
@@ -97,7 +100,10 @@ def written_report(
     Raises: MeshError when a file does not hold what its format asks for.
     """
     reading, wanted = reading or Reading(), corner_uv.astype(np.float64)
-    known = [(wanted, _judged(wanted, apart=reading.apart))]
+    judged = _judged(wanted, apart=reading.apart)
+    known = [(wanted, judged)]
+    if reading.fans is not None and len(reading.fans) == len(wanted):  # as fans the same polygons are other triangles
+        known.append((reading.fans.astype(np.float64), judged))
     report: dict[str, dict[str, Any]] = {}
     for kind, path in files.items():
         reads = path is not None and len(wanted) <= reading.most
@@ -172,30 +178,46 @@ def _primitive_uv(document: dict[str, Any], data: bytes, part: PartUv) -> NDArra
     return uv[faces[:, [0, 2, 1]] if part.mirrored else faces]
 
 
+def _fans(size: NDArray[np.int64], corner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(t, 3) int64: polygons of these sizes as fans from their first corner."""
+    return corner[fans(size)[0]]
+
+
 def _obj_uv(data: bytes) -> NDArray[np.float64]:
-    """Lines vt and f."""
+    """Lines vt and f; polygons without uv are left out."""
     lines = data.decode("utf-8").splitlines()
     uv = np.array([line.split()[1:3] for line in lines if line.startswith("vt ")], np.float32).astype(np.float64)
-    corners = [[word.split("/")[1] for word in line.split()[1:]] for line in lines if line.startswith("f ")]
-    return uv[np.array(corners, np.int64).reshape(-1, 3) - 1]
+    rows = [line.split()[1:] for line in lines if line.startswith("f ")]
+    corners = [[word.split("/")[1] for word in words] for words in rows if not words[0].count("//")]
+    size = np.array([len(row) for row in corners], np.int64)
+    flat = np.array([number for row in corners for number in row], np.int64)
+    return uv[_fans(size, flat) - 1]
 
 
 def _ply_uv(data: bytes) -> NDArray[np.float64]:
-    """Columns s and t, and the lists of three corners behind the vertices, of a binary file."""
+    """Columns s and t, and the lists of corners behind the vertices, of a binary file."""
     head, start = data.split(b"end_header\n", 1)[0].decode("ascii"), data.index(b"end_header\n") + 11
     counts = {kind: int(count) for kind, count in re.findall(r"element (\w+) (\d+)", head)}
     vertex = np.dtype([(name, PLY_TYPES[kind]) for kind, name in re.findall(r"property (\w+) (\w+)\n", head)])
     table = np.frombuffer(data, vertex, counts["vertex"], start)
-    face = np.dtype([("count", "u1"), ("corner", "<i4", (3,))])
-    faces = np.frombuffer(data, face, counts["face"], start + table.nbytes)
-    return np.column_stack([table["s"], table["t"]]).astype(np.float64)[faces["corner"]]
+    (length,) = re.findall(r"property list (\w+) int", head)
+    place, width, size, corner = start + table.nbytes, np.dtype(PLY_TYPES[length]).itemsize, [], []
+    for _ in range(counts["face"]):
+        number = int.from_bytes(data[place : place + width], "little")
+        corner.append(np.frombuffer(data, "<i4", number, place + width))
+        size.append(number)
+        place += width + 4 * number
+    faces = _fans(np.array(size, np.int64), np.concatenate(corner).astype(np.int64))
+    return np.column_stack([table["s"], table["t"]]).astype(np.float64)[faces]
 
 
 def _usda_uv(data: bytes) -> NDArray[np.float64]:
     """Attributes primvars:st and faceVertexIndices of the one mesh."""
     text = data.decode("utf-8")
-    index, st = (re.search(rf"{name} = \[([^\]]*)\]", text) for name in ("faceVertexIndices", "primvars:st"))
-    if index is None or st is None:
-        raise ValueError("no faceVertexIndices or primvars:st")
+    names = ("faceVertexCounts", "faceVertexIndices", "primvars:st")
+    count, index, st = (re.search(rf"{name} = \[([^\]]*)\]", text) for name in names)
+    if count is None or index is None or st is None:
+        raise ValueError("no faceVertexCounts, faceVertexIndices or primvars:st")
     numbers = np.array(re.findall(r"[-+.\deE]+", st[1]), np.float32).astype(np.float64)
-    return numbers.reshape(-1, 2)[np.array(index[1].split(","), np.int64).reshape(-1, 3)]
+    size, corner = (np.array(found[1].split(","), np.int64) for found in (count, index))
+    return numbers.reshape(-1, 2)[_fans(size, corner)]

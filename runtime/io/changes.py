@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..options import POLYGONS, SCENES
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from ..mesh import Asset
+    from ..options import Outputs
 
 UNSAID = frozenset({"welded_vertices", "unreferenced_vertices", "components"})
 WORDS = {
@@ -26,12 +31,16 @@ WORDS = {
     "missing_uv_or_normals": "{} referring to uv or normals that the file does not hold|corner|corners",
     "non_manifold_edges": "{} with three faces or more, cut there|edge|edges",
     "points_without_normal": "{} without a normal in a cloud that has them|point|points",
+    "polygons_as_triangles": "{} of over three corners written as triangles|polygon|polygons",
+    "polygons_cut": "{} cut by seams, written as triangles|polygon|polygons",
     "repaired_normals": "{} of no length or not finite replaced|normal|normals",
     "skipped_animations": "{} left out|animation|animations",
     "skipped_cameras": "{} left out|camera|cameras",
     "skipped_lights": "{} left out|light|lights",
     "skipped_lines": "{} left out|line element|line elements",
     "skipped_morph_targets": "{} left out|morph target|morph targets",
+    "skipped_names": "{} of objects, groups or smoothing left out|name|names",
+    "skipped_pictures": "{} of materials left out, as they lie on the old uv|picture|pictures",
     "skipped_points": "{} left out|point element|point elements",
     "skipped_primitives": "{} of points or lines left out|primitive|primitives",
     "skipped_skins": "{} left out: the mesh stands as it was modelled|skin|skins",
@@ -42,6 +51,23 @@ WORDS = {
     "vertices_without_colors": "{} without colours made white|vertex|vertices",
     "vertices_without_z": "{} of two numbers placed at z = 0|vertex|vertices",
 }
+
+
+def lost(asset: Asset, outputs: Outputs) -> dict[str, int]:
+    """What is in the file of a mesh and in nothing that will be written, name → count.
+
+    outputs: without "auto".
+    """
+    written, counts = set(outputs.formats), dict[str, int]()
+    if asset.document is not None and written.isdisjoint(SCENES):
+        counts |= asset.document.beyond_meshes()
+    if asset.obj is not None and "obj" not in written:
+        counts |= asset.obj.beyond_meshes()
+    if asset.obj is not None and "obj" in written:
+        counts["skipped_pictures"] = asset.obj.pictures(outputs.maps)
+    if asset.polygons is not None and written.isdisjoint(POLYGONS):
+        counts["polygons_as_triangles"] = asset.polygons.large
+    return {name: count for name, count in counts.items() if count}
 
 
 def told(changes: Mapping[str, int]) -> list[str]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import MeshError
+from ..mesh import Polygons
 from .colors import as_rgba
 from .polygons import triangles_of
 from .rawmesh import RawMesh, split_at_corners, to_float64
@@ -200,6 +201,7 @@ def _mesh(
         colors=_rgba(table[:, 3 + normals : color_end]),
         uv=table[:, -2:] if "T" in extra else None,
         changes={"faces_under_three_corners": found.left_out},
+        polygons=Polygons(found.corner, size),
     )
     colors = _face_rgba(face_colors, len(size)) if part.colors is None else None
     if colors is None:

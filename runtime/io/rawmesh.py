@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..mesh import Polygons
     from .gltf.document import Document
+    from .obj.text import ObjText
 
 LARGEST_DIAGONAL = 1e100  # beyond, areas leave the range of float64
 MAX_FACES = 20_000_000
@@ -33,7 +35,8 @@ class RawMesh:
     face_material: (f,) int64 into materials, or None.  changes: what reading could not keep, name → count.
     document: the scene that these triangles are of.  part: (f,) int64, the part of it that each face is in.  origin:
     (n,) int64, the vertex of that part that each vertex is.  body: (n,) int64, the object that each vertex belongs to;
-    vertices of two bodies are never one.
+    vertices of two bodies are never one.  polygons: what the triangles are in the file, where it holds polygons.  obj:
+    the text of an OBJ file.
     """
 
     positions: NDArray[np.float64]
@@ -48,6 +51,8 @@ class RawMesh:
     origin: NDArray[np.int64] | None = None
     body: NDArray[np.int64] | None = None
     document: Document | None = None
+    polygons: Polygons | None = None
+    obj: ObjText | None = None
 
 
 def check(raw: RawMesh) -> None:

@@ -56,6 +56,9 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
         faces=_turned(part.faces[kept], flip),
         face_material=None if part.face_material is None else part.face_material[kept],
         part=None if part.part is None else part.part[kept],
+        polygons=None
+        if part.polygons is None
+        else replace(part.polygons, corner=_turned(part.polygons.corner[kept], flip)),
         changes={**part.changes, **counts},
     )
     return _asset(whole, _turned(sheets, flip), stem=stem, sha256=sha256)
@@ -101,6 +104,8 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         part=part.part,
         origin=part.origin,
         document=part.document,
+        polygons=part.polygons,
+        obj=part.obj,
     )
 
 

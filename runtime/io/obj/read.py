@@ -17,11 +17,13 @@ import numpy as np
 
 from ...errors import MeshError
 from ...material import Material
+from ...mesh import Polygons
 from ..polygons import triangulate
 from ..rawmesh import RawMesh
-from ..text import shown
+from ..text import lines_of, shown
 from .lines import split
 from .materials import read_mtl
+from .text import ObjText
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +60,7 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         MeshError: unreadable numbers, vertices that are not there or not finite, no faces; it names the line.
     """
     lines = split(data)
-    changes = {"skipped_lines": lines.count("l"), "skipped_points": lines.count("p")}
+    changes: dict[str, int] = {}
     positions, colors = _vertices(lines, changes)
     polygons = _polygons(lines, changes)
     _check_positions(positions, lines, polygons)
@@ -80,6 +82,8 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         materials=materials,
         face_material=face_material,
         changes=changes,
+        polygons=Polygons(triangles, polygons.size),
+        obj=ObjText(data, polygons.number, corners, polygons.size, _library_text(lines, read_sibling)),
     )
 
 
@@ -207,6 +211,12 @@ def _libraries(lines: Lines, read_sibling: Callable[[str], bytes | None]) -> lis
     for line in lines.text["mtllib"]:
         names += [line] if read_sibling(line) is not None else line.split()
     return list(dict.fromkeys(names))
+
+
+def _library_text(lines: Lines, read_sibling: Callable[[str], bytes | None]) -> str:
+    """The lines of all material libraries that are there."""
+    found = [data for name in _libraries(lines, read_sibling) if (data := read_sibling(name)) is not None]
+    return "\n".join("\n".join(lines_of(data)) for data in found)
 
 
 def _materials(

@@ -5,6 +5,7 @@ n atlas vertices · f faces.  uv is v up.
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,11 +20,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...mesh import Atlas
+    from ..loops import Loops
 
 MATERIAL = "atlas"
 
 
-def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: NDArray[np.uint8] | None = None) -> None:
+def write_obj(
+    atlas: Atlas,
+    path: Path,
+    *,
+    texture: str | None = None,
+    colors: NDArray[np.uint8] | None = None,
+    loops: Loops | None = None,
+) -> None:
     """Write Wavefront OBJ, and `<stem>.mtl` beside it when there is a texture.
 
     One `v` per distinct position and one `vt` per atlas vertex, so that seams split uv and nothing else.  Positions
@@ -35,6 +44,7 @@ def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: N
         texture: name of the picture with the base colour, beside the OBJ file.
         colors: (source vertices, 4) uint8, those of the Asset that the atlas came from, or None: written behind the
             positions as red green blue in [0, 1] (a widespread extension; where vertices share a position, the first).
+        loops: the polygons to write; None writes the triangles.
 
     Raises:
         InputError: the name of the texture or of the file would break the lines of the format.
@@ -50,12 +60,17 @@ def write_obj(atlas: Atlas, path: Path, *, texture: str | None = None, colors: N
         columns.append(source_colors(atlas, colors)[first, :3] / 255.0)
     normal = equal_rows(atlas.normals.astype(np.float64))
     normals = atlas.normals[first_of_each(normal)].astype(np.float64)
-    corners = np.stack([vertex[atlas.faces], atlas.faces, normal[atlas.faces]], axis=2) + 1
     head = ["# flexpara: uv are v up"]
     if texture is not None:
         head.append(f"mtllib {library.name}")
     used = [] if texture is None else [f"usemtl {MATERIAL}"]
-    faces = [f"f {a}/{b}/{c} {d}/{e}/{g} {h}/{i}/{j}" for a, b, c, d, e, g, h, i, j in corners.reshape(-1, 9).tolist()]
+    corner = atlas.faces.reshape(-1) if loops is None else loops.vertex
+    words = [
+        f"{v}/{vt}/{vn}" for v, vt, vn in (np.stack([vertex[corner], corner, normal[corner]], axis=1) + 1).tolist()
+    ]
+    size = [3] * len(atlas.faces) if loops is None else loops.size.tolist()
+    end = list(accumulate(size))
+    faces = [f"f {' '.join(words[last - own : last])}" for own, last in zip(size, end, strict=True)]
     lines = [
         *head,
         *_rows("v", np.hstack(columns)),

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
+from ...mesh import Polygons
 from ..colors import as_rgba
 from ..pictures import decode_image
 from ..polygons import Triangles, strip_triangles, triangles_of
@@ -135,6 +136,7 @@ def _with_faces(raw: RawMesh, table: Table, header: PlyHeader, read_sibling: Cal
     changes = {"faces_under_three_corners": found.left_out}
     materials, face_material = _materials(table, found.polygon, header, read_sibling, changes)
     part = replace(raw, faces=found.faces, materials=materials, face_material=face_material, changes=changes)
+    part = replace(part, polygons=Polygons(found.corner, lists.size))
     return _with_face_colors(_with_corner_uv(part, table, lists.size, found), table, found)
 
 

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...mesh import Atlas
+    from ..loops import Loops
     from ..points.cloud import PointCloud
 
     Column = tuple[str, str, NDArray[Any]]
 
 WORDS = {"<f8": "double", "<f4": "float", "<i4": "int", "u1": "uchar"}
-CORNERS = "property list uchar int vertex_indices"
 
 
-def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = None) -> None:
+def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = None, loops: Loops | None = None) -> None:
     """Write binary little-endian PLY: double x y z, float nx ny nz s t, and with colours uchar red green blue alpha.
 
     PLY has one uv per vertex, so vertices are split along seams.
@@ -36,6 +36,7 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
         atlas: what to write.
         path: the .ply file.
         colors: (source vertices, 4) uint8, those of the Asset that the atlas came from, or None.
+        loops: the polygons to write; None writes the triangles.
 
     Raises:
         ShapeError: colours of another shape or dtype, or too few of them.
@@ -47,9 +48,22 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
     ]
     if colors is not None:
         columns += _columns("red green blue alpha", "u1", source_colors(atlas, colors))
-    polygons = np.zeros(len(atlas.faces), dtype=[("count", "u1"), ("corner", "<i4", (3,))])
-    polygons["count"], polygons["corner"] = 3, atlas.faces
-    path.write_bytes(_ply(columns, [f"element face {len(polygons)}", CORNERS]) + polygons.tobytes())
+    size = np.full(len(atlas.faces), 3) if loops is None else loops.size
+    corner = atlas.faces.reshape(-1) if loops is None else loops.vertex
+    kind = "uchar" if int(size.max()) < 256 else "int"
+    head = _ply(columns, [f"element face {len(size)}", f"property list {kind} int vertex_indices"])
+    path.write_bytes(head + _lists(size, corner, 1 if kind == "uchar" else 4))
+
+
+def _lists(size: NDArray[np.int64], corner: NDArray[np.int64], width: int) -> bytes:
+    """Each list's length, in width bytes, and its numbers (int), one after the other."""
+    start = np.cumsum(width + 4 * size) - (width + 4 * size)
+    data = np.zeros(int((width + 4 * size).sum()), dtype=np.uint8)
+    data[start[:, None] + np.arange(width)] = size.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :width]
+    step = np.arange(len(corner)) - np.repeat(np.cumsum(size) - size, size)
+    place = np.repeat(start + width, size) + 4 * step
+    data[place[:, None] + np.arange(4)] = corner.astype("<i4").view(np.uint8).reshape(-1, 4)
+    return data.tobytes()
 
 
 def write_cloud_ply(path: Path, cloud: PointCloud, uv: NDArray[np.float32], chart: NDArray[np.int64]) -> None:

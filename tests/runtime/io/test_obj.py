@@ -169,10 +169,12 @@ def test_uv_and_normals_that_are_not_there_count_as_absent() -> None:
     assert read(f"{SQUARE}f 1/1 2/1 3/1\n").uv is None
 
 
-def test_faces_under_three_corners_lines_and_points_are_skipped_and_counted() -> None:
+def test_faces_under_three_corners_are_skipped_and_counted_lines_and_points_kept_as_text() -> None:
     raw = read(f"{SQUARE}f 1 2\nf 1 2 3\nl 1 2 3\np 1 2\nl 1 2\n")
     np.testing.assert_array_equal(raw.faces, [[0, 1, 2]])
-    assert nonzero(raw) == {"faces_under_three_corners": 1, "skipped_lines": 2, "skipped_points": 1}
+    assert nonzero(raw) == {"faces_under_three_corners": 1}
+    assert raw.obj is not None
+    assert raw.obj.beyond_meshes() == {"skipped_lines": 2, "skipped_points": 1}
 
 
 def test_vertices_of_two_numbers_lie_at_z_0() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ import pytest
 from flexpara.runtime.io.obj import lines
 from flexpara.runtime.io.obj.plain import plain_lines
 from flexpara.runtime.io.obj.read import read_obj
-from flexpara.runtime.io.rawmesh import RawMesh
 
 HEAD = "# made by hand\no thing\nv 0 0 0\nv 1 0 0\nv 1 1 0.5e-3\nv -0 1 0\n"
 UV = "vt 0 0\nvt 1 0\nvt 1 1\n"
@@ -50,14 +50,17 @@ def nothing(_: str) -> bytes | None:
     return None
 
 
-def assert_same(one: RawMesh, other: RawMesh) -> None:
-    for field in fields(RawMesh):
+def assert_same(one: Any, other: Any) -> None:
+    assert type(one) is type(other)
+    for field in fields(one):
         first, second = getattr(one, field.name), getattr(other, field.name)
         if isinstance(first, np.ndarray):
             assert first.dtype == second.dtype
             np.testing.assert_array_equal(first, second)
         elif field.name == "materials":
             assert [material.name for material in first] == [material.name for material in second]
+        elif is_dataclass(first):
+            assert_same(first, second)
         else:
             assert first == second
 

@@ -1,0 +1,88 @@
+"""The polygons of a file over the vertices of an atlas: what formats that hold polygons write.
+
+c corners of all polygons of the file, one polygon after the other · p polygons · f triangles · m loops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .polygons import fans
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..mesh import Asset, Atlas, Polygons
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Polygons as they are written, in the order of the file.
+
+    size: (m,) int64 corners of each.  vertex: atlas vertex of each corner of all.  corner: the corner of the file that
+    each is.  polygon: (m,) the file's polygon that each is of.  cut: how many of the file's polygons a seam cuts,
+    which are written as triangles.
+    """
+
+    size: NDArray[np.int64]
+    vertex: NDArray[np.int64]
+    corner: NDArray[np.int64]
+    polygon: NDArray[np.int64]
+    cut: int
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """(t, 3) int64 atlas vertices: each loop as a fan from its first corner."""
+        return self.vertex[fans(self.size)[0]]
+
+
+def loops_of(atlas: Atlas, asset: Asset) -> Loops:
+    """The polygons that the asset's triangles are of; its triangles where its file knows nothing else."""
+    count = len(atlas.faces)
+    if asset.polygons is None or len(asset.polygons.corner) != count:
+        every = np.arange(3 * count)
+        return Loops(np.full(count, 3), atlas.faces.reshape(-1), every, np.arange(count), 0)
+    return _loops(atlas.faces, atlas.uv, asset.polygons)
+
+
+def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons) -> Loops:
+    """Loops of faces (f, 3) whose corners are those of polygons; uv (n, 2) of the vertices."""
+    corner, own = polygons.corner, np.full(int(polygons.size.sum()), -1, dtype=np.int64)
+    own[corner] = faces
+    polygon = polygons.of_faces
+    turned = _turned(corner)
+    broken = (uv[own[corner]] != uv[faces]).any(axis=(1, 2))
+    first = np.zeros(len(polygons.size), dtype=np.int64)
+    first[polygon[::-1]] = np.arange(len(faces))[::-1]
+    broken |= turned != turned[first[polygon]]
+    cut = np.zeros(len(polygons.size), dtype=np.bool_)
+    cut[polygon[broken]] = True
+    of_corner = np.repeat(np.arange(len(polygons.size)), polygons.size)
+    kept = np.flatnonzero((own >= 0) & ~cut[of_corner])
+    backward = np.zeros(len(polygons.size), dtype=np.bool_)
+    backward[polygon] = turned
+    order = kept[np.lexsort((np.where(backward[of_corner[kept]], -kept, kept), of_corner[kept]))]
+    whole = np.unique(of_corner[order])
+    pieces = np.flatnonzero(cut[polygon])
+    size = np.concatenate([np.bincount(of_corner[order])[whole], np.full(len(pieces), 3)])
+    number = np.concatenate([whole, polygon[pieces]])
+    vertex = np.concatenate([own[order], faces[pieces].reshape(-1)])
+    places = np.concatenate([order, corner[pieces].reshape(-1)])
+    sort = np.argsort(number, kind="stable")
+    start = np.cumsum(size) - size
+    spread = np.repeat(start[sort], size[sort]) + _counting(size[sort])
+    return Loops(size[sort], vertex[spread], places[spread], number[sort], int(cut.sum()))
+
+
+def _turned(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(f,) bool: triangles whose corners run against those of their polygon."""
+    a, b, c = corner.T
+    return ((b - a > 0).astype(np.int8) + (c - b > 0) + (a - c > 0)) == 1
+
+
+def _counting(size: NDArray[np.int64]) -> NDArray[np.int64]:
+    """0 … s − 1 for each size s, one after the other."""
+    return np.arange(int(size.sum())) - np.repeat(np.cumsum(size) - size, size)

@@ -1,0 +1,79 @@
+"""An OBJ file beside the mesh that is read of it: its lines as they are, and which of them are the polygons.
+
+A statement is a line, those joined by a backslash at the end being one.  v, vt, vn: positions, uv, normals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from ..text import lines_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+NAMING = ("o", "g", "s")
+ELEMENTS = ("l", "p")
+PICTURES = {"base-color": "map_Kd", "emissive": "map_Ke", "normal": "norm"}
+"""Map → keyword of its line in a material library."""
+TEXTURES = ("map_", "bump", "norm", "disp", "decal", "refl")
+"""Beginnings of the lines of a material library that name pictures."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObjText:
+    """The text.
+
+    data: the bytes of the file.  line: (p,) int64, the number of the (last) line of each polygon, from 1.  corners:
+    (c, 3) int64, v, vt and vn of each corner of all polygons, from 0, −1 where absent.  size: (p,) int64, corners of
+    each polygon.  materials: the text of its libraries, "" without any.
+    """
+
+    data: bytes
+    line: NDArray[np.int64]
+    corners: NDArray[np.int64]
+    size: NDArray[np.int64]
+    materials: str = ""
+
+    @cached_property
+    def statements(self) -> dict[int, str]:
+        """All statements by the number of their last line, in their order."""
+        found, waiting = dict[int, str](), ""
+        for number, line in enumerate(lines_of(self.data), start=1):
+            waiting += line
+            if line.endswith("\\"):
+                waiting = waiting[:-1] + " "
+            else:
+                found[number], waiting = waiting, ""
+        return found
+
+    def beyond_meshes(self) -> dict[str, int]:
+        """What other formats have no word for: named objects and groups, smoothing groups, lines and points."""
+        kinds = [keyword(statement) for statement in self.statements.values()]
+        counts = {
+            "skipped_names": sum(kind in NAMING for kind in kinds),
+            "skipped_lines": kinds.count("l"),
+            "skipped_points": kinds.count("p"),
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    def pictures(self, maps: Sequence[str]) -> int:
+        """How many pictures its materials name that none of the maps baked takes the place of."""
+        baked = {PICTURES[name].lower() for name in maps if name in PICTURES}
+        return sum(is_picture(line) and keyword(line) not in baked for line in self.materials.split("\n"))
+
+
+def keyword(line: str) -> str:
+    """The first word, in small letters."""
+    words = line.split(maxsplit=1)
+    return words[0].lower() if words else ""
+
+
+def is_picture(line: str) -> bool:
+    """Whether a line of a material library names a picture."""
+    return keyword(line).startswith(TEXTURES)
