@@ -1,4 +1,4 @@
-"""Face labels: from chart probabilities to at most K connected pieces with short seams along creases.
+"""Face labels: from what each face would rather be to connected pieces with short seams along creases.
 
 f faces · k labels · a *dual graph* joins faces across interior edges: pairs (m, 2), seam cost (m,) in lengths.
 """
@@ -133,17 +133,14 @@ def connected_pieces(label: NDArray[np.int64], graph: DualGraph) -> NDArray[np.i
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def merge_pieces(
-    label: NDArray[np.int64], areas: NDArray[np.float64], graph: DualGraph, most: int, config: LabelConfig
+def islets_joined(
+    label: NDArray[np.int64], areas: NDArray[np.float64], graph: DualGraph, config: LabelConfig
 ) -> NDArray[np.int64]:
-    """Pieces (f,), numbered 0…: islets and whatever exceeds ``most`` pieces a component joins its longest neighbour.
+    """Connected pieces (f,), numbered 0…: each islet joins the neighbour it shares most border with, the least first.
 
-    A piece that is a whole connected component has no neighbour and stays; each component beyond the first raises the
-    limit by one.
+    A piece that is a whole connected component has no neighbour and stays.
     """
     piece = connected_pieces(label, graph)
-    component = connected_pieces(np.zeros_like(label), graph)
-    most += int(component.max())
     smallest = config.islet_area * areas.sum()
     while True:
         count = int(piece.max()) + 1
@@ -153,7 +150,7 @@ def merge_pieces(
         if len(mergeable) == 0:
             return piece
         least = int(mergeable[size[mergeable].argmin()])
-        if size[least] >= smallest and count <= most:
+        if size[least] >= smallest:
             return piece
         piece = np.where(piece == least, border[least].argmax(), piece)
         piece = np.unique(piece, return_inverse=True)[1].astype(np.int64)

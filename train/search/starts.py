@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .labels import connected_pieces, merge_pieces, smooth_labels
+from .labels import connected_pieces, islets_joined, smooth_labels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +25,7 @@ def clusters(
     areas = surface.face_areas()
     doubt = distances(surface, areas, count, config.start, rng) * config.start.certainty
     label = smooth_labels(doubt * areas[:, None] / config.labels.smoothing, graph)
-    return merge_pieces(label, areas, graph, len(label), config.labels)
+    return islets_joined(label, areas, graph, config.labels)
 
 
 def pieces_by_score(
@@ -33,7 +33,7 @@ def pieces_by_score(
 ) -> NDArray[np.int64]:
     """Connected pieces (f,), numbered 0…, from log chart probabilities (f, k) at the faces."""
     label = smooth_labels(-score * areas[:, None] / config.smoothing, graph)
-    return merge_pieces(label, areas, graph, len(label), config)
+    return islets_joined(label, areas, graph, config)
 
 
 def distances(

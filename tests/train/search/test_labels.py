@@ -18,8 +18,8 @@ from flexpara.train.search.labels import (
     connected_pieces,
     dual_graph,
     expand_label,
+    islets_joined,
     label_energy,
-    merge_pieces,
     smooth_labels,
 )
 
@@ -40,12 +40,6 @@ def hinge(angle: float) -> Surface:
     side = [0.0, -np.cos(angle), np.sin(angle)]
     vertices = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], side])
     return Surface(vertices, np.array([[0, 1, 2], [1, 0, 3]]))
-
-
-def twins(surface: Surface) -> Surface:
-    """The surface and a copy of it beside it: two components."""
-    vertices = np.concatenate([surface.vertices, surface.vertices + FAR_APART])
-    return Surface(vertices, np.concatenate([surface.faces, surface.faces + len(surface.vertices)]))
 
 
 def random_graph(rng: np.random.Generator, faces: int, links: int) -> DualGraph:
@@ -180,19 +174,9 @@ def test_an_islet_joins_the_neighbour_it_shares_most_border_with() -> None:
     islet = np.linalg.norm(centre - [0.99, 0.0, 0.13], axis=1) < 0.2
     assert set(label[islet]) == {0, 1}  # it straddles the border
     label[islet] = 2
-    piece = merge_pieces(label, sphere.face_areas(), graph_of(sphere), 100, LabelConfig(islet_area=0.02))
+    piece = islets_joined(label, sphere.face_areas(), graph_of(sphere), LabelConfig(islet_area=0.02))
     assert piece.max() == 1
     assert (piece[islet] == piece[centre[:, 2].argmax()]).all()
-
-
-@pytest.mark.parametrize("most", [1, 2, 4])
-def test_no_more_pieces_than_asked_for_each_connected_and_numbered_from_zero(most: int) -> None:
-    torus = sample("torus", 32)
-    angle = np.arctan2(torus.vertices[:, 1], torus.vertices[:, 0])[torus.faces[:, 0]]
-    label, graph = ((angle + np.pi) * 7.0 / (2.0 * np.pi)).astype(np.int64) % 7, graph_of(torus)
-    piece = merge_pieces(label, torus.face_areas(), graph, most, CONFIG)
-    assert np.unique(piece).tolist() == list(range(most))
-    assert connected_pieces(piece, graph).max() + 1 == most
 
 
 def test_each_component_keeps_a_piece_however_small() -> None:
@@ -200,15 +184,8 @@ def test_each_component_keeps_a_piece_however_small() -> None:
     vertices = np.concatenate([big.vertices, 0.01 * small.vertices + FAR_APART])
     both = Surface(vertices, np.concatenate([big.faces, small.faces + len(big.vertices)]))
     label = np.random.default_rng(0).integers(0, 4, len(both.faces))
-    piece = merge_pieces(label, both.face_areas(), graph_of(both), 1, CONFIG)
+    piece = islets_joined(label, both.face_areas(), graph_of(both), LabelConfig(islet_area=0.99))
     assert piece.tolist() == [0] * len(big.faces) + [1] * len(small.faces)
-
-
-def test_each_component_beyond_the_first_raises_the_limit() -> None:
-    both = twins(sample("sphere", 24))
-    label, graph = (both.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), graph_of(both)
-    assert merge_pieces(label, both.face_areas(), graph, 2, CONFIG).max() + 1 == 3
-    assert merge_pieces(label, both.face_areas(), graph, 3, CONFIG).max() + 1 == 4
 
 
 def test_labels_are_not_written_to() -> None:
@@ -217,5 +194,5 @@ def test_labels_are_not_written_to() -> None:
     unary, before = np.zeros((len(label), 3)), label.copy()
     graph = graph_of(sphere)
     expand_label(label, 0, unary, graph)
-    merge_pieces(label, sphere.face_areas(), graph, 2, CONFIG)
+    islets_joined(label, sphere.face_areas(), graph, CONFIG)
     assert np.array_equal(label, before)
