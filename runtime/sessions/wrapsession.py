@@ -10,16 +10,15 @@ the graph's two centre initializers to zero and adds it in float64, so that far 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BundleError, InputError, ShapeError
-from .bundle import METADATA_KEY, BundleMetadata
-from .chunks import checked_chunk, checked_threads, fill_in_chunks
-from .session import open_bundle
+from ..errors import InputError, ShapeError
+from .bundle import BundleMetadata
+from .chunks import fill_in_chunks
+from .opened import BundleSession
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,44 +50,12 @@ class Wrapped(NamedTuple):
     normals: NDArray[np.float32]
 
 
-class WrapSession:
+class WrapSession(BundleSession):
     """An exported inverse.  Immutable; `wrap` may be called from several threads at once."""
 
-    def __init__(
-        self,
-        path: str | Path,
-        *,
-        providers: Sequence[str] = ("CPUExecutionProvider",),
-        chunk: int = 16_384,
-        threads: int | None = None,
-    ) -> None:
-        """Load and check a file; arguments and errors are those of UnwrapSession.
-
-        Args:
-            path: a .wrap.onnx file that flexpara wrote.
-            providers: onnxruntime execution providers, best first; all must really be used, there is no fallback.
-            chunk: rows a run.
-            threads: that answer a chunk each; None = one a core.
-
-        Raises:
-            MissingFileError: nothing lies at path.
-            BundleError: not an ONNX file, not an inverse written by flexpara, damaged, or of another format version.
-            MissingDependencyError: a provider is not in this build of onnxruntime or can't start here.
-            InputError: chunk or threads below 1.
-        """
-        self._chunk, self._threads = checked_chunk(chunk), checked_threads(threads)
-        self._opened = open_bundle(Path(path), providers, INPUTS, OUTPUTS)
-        _check_kind(self._opened.session.get_modelmeta().custom_metadata_map[METADATA_KEY], Path(path))
-
-    @property
-    def metadata(self) -> BundleMetadata:
-        """What the file says about itself: frame, placement, source hash, settings, metrics, producer."""
-        return self._opened.metadata
-
-    @property
-    def chart_count(self) -> int:
-        """Number of charts, k."""
-        return self._opened.metadata.chart_count
+    INPUTS = INPUTS
+    OUTPUTS = OUTPUTS
+    KIND = KIND
 
     def wrap(self, uv: Coordinates, chart: NDArray[np.integer]) -> Wrapped:
         """Surface points and normals.
@@ -118,13 +85,6 @@ def wrap_json(facts: BundleMetadata) -> str:
     """The metadata of an inverse as one line of JSON.  Raises: as BundleMetadata.to_json."""
     content = json.loads(facts.to_json()) | {"kind": KIND, "conventions": CONVENTIONS}
     return json.dumps(content, allow_nan=False, sort_keys=True, separators=(",", ":"))
-
-
-def _check_kind(text: str, path: Path) -> None:
-    """``text`` has passed BundleMetadata.from_json: it is a JSON object."""
-    kind = json.loads(text).get("kind")
-    if kind != KIND:
-        raise BundleError(f"{path}: metadata of kind {str(kind)[:40]!r}, expected {KIND!r}; pass the .wrap.onnx file")
 
 
 def _checked_uv(uv: Coordinates) -> Coordinates:
