@@ -75,14 +75,17 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[train] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
+    from .runtime.deadline import Deadline
     from .runtime.io.points.cloud import PointCloud
     from .runtime.options import Options, from_keywords
+    from .runtime.progress import Clock
 
     options = from_keywords(Options, options, keywords)
+    clock = Clock(progress, Deadline(options.time_budget))
     source = load_any(mesh)
     if isinstance(source, PointCloud):
-        return unwrap_cloud(source, options, progress)
-    return unwrap_asset(source, options, progress)
+        return unwrap_cloud(source, options, clock)
+    return unwrap_asset(source, options, clock)
 
 
 def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
@@ -109,7 +112,7 @@ def unwrap_asset(
         from .export.assemble import assemble
         from .train.presets import train_asset
 
-    clock = Clock(progress)
+    clock = Clock.of(progress)
     trained = train_asset(asset, options, clock, keep)
     return UnwrapResult(asset, assemble(asset, trained, clock, size=options.size, padding=options.margin))
 
@@ -128,7 +131,7 @@ def unwrap_cloud(
         from .export.assemble import assemble
         from .train.presets import train_cloud
 
-    clock = Clock(progress)
+    clock = Clock.of(progress)
     mesh, trained = train_cloud(cloud, options, clock, keep)
     found = assemble(mesh.asset, trained, clock, size=options.size, padding=options.margin)
     return UnwrapResult(mesh.asset, found, cloud, mesh)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -21,6 +22,7 @@ from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Console, Manners, complain
+from .runtime.deadline import Deadline, interrupts_ask
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.options import AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
@@ -113,6 +115,7 @@ def _perform(run: Run, console: Console) -> int:
     from .runtime.mesh import Asset
 
     chosen_maps(run.outputs)
+    deadline = Deadline(run.options.time_budget)
     with console.progress() as progress:
         source = load_any(run.mesh)
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
@@ -121,10 +124,14 @@ def _perform(run: Run, console: Console) -> int:
                 console.note_changes(source, lost(source, outputs))
                 check_outputs(folder, outputs, chosen_maps(outputs))
             run.save()
-            if isinstance(source, Asset):
-                result = unwrap_asset(source, run.options, progress, run.keep)
-            else:
-                result = unwrap_cloud(source, run.options, progress, run.keep)
+            clock, ending = Clock(progress, deadline), nullcontext()
+            if run.options.preset == "fast":  # preset paper has checkpoints
+                ending = interrupts_ask(deadline, console.note)
+            with ending:
+                if isinstance(source, Asset):
+                    result = unwrap_asset(source, run.options, clock, run.keep)
+                else:
+                    result = unwrap_cloud(source, run.options, clock, run.keep)
             written = result.write(folder, run.outputs, progress, console.note)
     if result.cloud is not None:
         console.note_changes(result.asset)
@@ -161,7 +168,7 @@ def train(
             from .train.presets import train_asset
             from .train.saved import to_bytes
         with console.progress() as progress:
-            trained = train_asset(asset, options, Clock(progress))
+            trained = train_asset(asset, options, Clock(progress, Deadline(options.time_budget)))
         folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
         source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
         facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}

@@ -118,8 +118,12 @@ class ChartOptions:
     """The most charts that each connected part of the surface may get."""
     preset: Literal["fast", "paper"] = "fast"
     """The way of training: fast takes seconds on a CPU; paper trains as published, which wants a GPU."""
+    time_budget: float | None = None
+    """Seconds after which preset fast ends with the best valid charts so far, maps not counted; by default none."""
 
     def __post_init__(self) -> None:
+        fits = self.time_budget is None or (self.time_budget > 0.0 and self.preset == "fast")
+        demand(fits, f"time-budget is {self.time_budget}, expected seconds above 0 and preset fast; leave it out")
         demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
         demand_known("preset", self.preset, PRESETS)
 

@@ -7,6 +7,8 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
+from .deadline import Deadline
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -22,9 +24,16 @@ class Progress(Protocol):
 class Clock:
     """Passes progress on, and keeps the seconds of each stage: the time until a call belongs to the stage it names."""
 
-    def __init__(self, progress: Progress | None = None) -> None:
+    def __init__(self, progress: Progress | None = None, deadline: Deadline | None = None) -> None:
+        """``deadline``: when whoever is told the time should come to an end; None: never."""
+        self.deadline = deadline or Deadline()
         self._progress, self._last = progress, time.perf_counter()
         self.seconds: dict[str, float] = {}
+
+    @classmethod
+    def of(cls, progress: Progress | None) -> Clock:
+        """The clock that progress is, or one that passes it on."""
+        return progress if isinstance(progress, Clock) else cls(progress)
 
     def __call__(self, stage: str, step: int, steps: int, loss: float | None = None) -> None:
         """See Progress."""
@@ -40,6 +49,23 @@ class Clock:
         self(name, 0, 1)
         yield
         self(name, 1, 1)
+
+
+class Stages:
+    """Stages of one step, told by their names: each ends the one before.  And whether it is time to end."""
+
+    def __init__(self, progress: Progress | None = None, deadline: Deadline | None = None) -> None:
+        self.deadline = deadline or Deadline()
+        self._progress, self._running = progress, ""
+
+    def __call__(self, name: str) -> None:
+        """A stage begins."""
+        if self._progress is None:
+            return
+        if self._running:
+            self._progress(self._running, 1, 1)
+        self._running = name
+        self._progress(name, 0, 1)
 
 
 @contextmanager

@@ -18,6 +18,7 @@ import pytest
 import flexpara.train  # noqa: F401  # before torch, whose threads it tells how to wait
 
 if TYPE_CHECKING:
+    from flexpara.runtime.deadline import Deadline
     from flexpara.runtime.mesh import Surface
     from flexpara.runtime.progress import Progress
 
@@ -103,7 +104,9 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
 
     trained: list[Surface] = []
 
-    def train(surface: Surface, settings: TrainConfig, progress: Progress | None = None) -> Trained:
+    def train(
+        surface: Surface, settings: TrainConfig, progress: Progress | None = None, _: Deadline | None = None
+    ) -> Trained:
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)

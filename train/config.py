@@ -150,6 +150,16 @@ class FineConfig:
 
 
 @dataclass(frozen=True)
+class HasteConfig:
+    """What a time budget has to leave for all that follows the search."""
+
+    seconds: float = 1.0
+    """Of any surface …"""
+    seconds_per_face: float = 2e-5
+    """… and for each of its faces."""
+
+
+@dataclass(frozen=True)
 class SplitConfig:
     """Where a chart may be cut in two: along isolines of the distance from a seed."""
 
@@ -191,6 +201,8 @@ class FinishConfig:
     """From the simplified twin back to the surface."""
     fine: FineConfig = field(default_factory=FineConfig)
     """Parts of many faces."""
+    haste: HasteConfig = field(default_factory=HasteConfig)
+    """Time budgets."""
     split: SplitConfig = field(default_factory=SplitConfig)
     """Where a chart may be cut in two."""
     foretold: float = 0.4

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.mesh import Charts, Frame, Surface
+from ..runtime.progress import Stages
 from .deploy.fit import fit_networks
 from .search.charts import Finished, chart_surface
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from torch import nn
 
+    from ..runtime.deadline import Deadline
     from ..runtime.progress import Progress
     from .config import TrainConfig
     from .deploy.gated import GatedExperts
@@ -42,15 +42,21 @@ class Trained:
     paper: nn.Module | None = None
 
 
-def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
+def train(surface: Surface, config: TrainConfig, progress: Progress, deadline: Deadline | None = None) -> Trained:
     """Charts and networks of a welded surface.
+
+    Args:
+        surface: in source units.
+        config: numbers.
+        progress: told the stages.
+        deadline: when the search ends with the best it has; None: it ends by itself, the same every time.
 
     Raises:
         FinishError: no valid charts could be made (a defect).
     """
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
-    finished = chart_surface(ball, config.charts, config.finish, config.seed, in_turn(progress))
+    finished = chart_surface(ball, config.charts, config.finish, config.seed, Stages(progress, deadline))
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
@@ -64,19 +70,6 @@ def train(surface: Surface, config: TrainConfig, progress: Progress) -> Trained:
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
-
-
-def in_turn(progress: Progress) -> Callable[[str], None]:
-    """Stages of one step: naming one ends the one before."""
-    running: list[str] = []
-
-    def begin(name: str) -> None:
-        while running:
-            progress(running.pop(), 1, 1)
-        running.append(name)
-        progress(name, 0, 1)
-
-    return begin
 
 
 def as_charts(surface: Surface, finished: Finished) -> Charts:

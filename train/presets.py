@@ -43,7 +43,7 @@ def train_asset(
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
     if options.preset != "paper":
-        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock)
+        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock, clock.deadline)
     with requires("train"):
         from .paper.batches import PaperInput
         from .paper.checkpoint import Checkpoints

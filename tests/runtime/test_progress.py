@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from flexpara.runtime.progress import Clock, progress_bars
+from flexpara.runtime.deadline import Deadline
+from flexpara.runtime.progress import Clock, Stages, progress_bars
 
 
 class Terminal(io.StringIO):
@@ -58,3 +59,18 @@ def test_a_terminal_sees_stage_step_and_loss(monkeypatch: pytest.MonkeyPatch) ->
     drawn = sys.stderr.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
     for word in ("train", "3/400", "0.125"):
         assert word in drawn
+
+
+def test_stages_end_as_the_next_begins() -> None:
+    calls: list[tuple[str, int, int, float | None]] = []
+    stage = Stages(lambda stage, step, steps, loss=None: calls.append((stage, step, steps, loss)))
+    stage("parts")
+    stage("charts")
+    assert calls == [("parts", 0, 1, None), ("parts", 1, 1, None), ("charts", 0, 1, None)]
+    assert not stage.deadline.passed()
+
+
+def test_a_clock_is_taken_as_it_is() -> None:
+    clock = Clock(deadline=Deadline(5.0))
+    assert Clock.of(clock) is clock
+    assert Clock.of(None).deadline.seconds is None

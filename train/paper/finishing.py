@@ -40,9 +40,10 @@ from .conformal import ConformalConfig, conformal_steps, is_valid
 from .learnedseams import SeamConfig, seam_edges, tears
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
-    from ..search.charts import Stage
     from ..search.labels import DualGraph
 
 
@@ -89,7 +90,10 @@ class GlobalFinish(NamedTuple):
 
 
 def finish_global(
-    surface: Surface, uv: NDArray[np.float64], stage: Stage, config: GlobalFinishConfig = GlobalFinishConfig()
+    surface: Surface,
+    uv: NDArray[np.float64],
+    stage: Callable[[str], None],
+    config: GlobalFinishConfig = GlobalFinishConfig(),
 ) -> GlobalFinish:
     """Valid charts of a surface from one learned map: one per connected component, more only where that can't be had.
 

@@ -17,9 +17,10 @@ import torch
 from ...runtime.geometry.metrics import measure
 from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_areas, triangle_areas
 from ...runtime.mesh import Charts, Frame, Surface
+from ...runtime.progress import Stages
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
-from ..pipeline import Trained, as_charts, in_turn
+from ..pipeline import Trained, as_charts
 from ..sampling import sample_surface
 from ..search.charts import chart_surface
 from .batches import PaperInput
@@ -72,7 +73,7 @@ def train_paper_surface(
     samples = samples or PaperInput(ball.vertices, vertex_normals(ball), ball.faces)
     steps, finishing = config.steps, GlobalFinishConfig(finish=deploy.finish)
     paper = train_paper(samples, config, lambda step, loss: progress("train", step, steps, loss), checkpoints)
-    finished, report = finish_learned(ball, as_numpy(paper), config, in_turn(progress), finishing)
+    finished, report = finish_learned(ball, as_numpy(paper), config, Stages(progress), finishing)
     charts = as_charts(ball, finished)
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
     report["finished"] = finished_figures(surface, charts, finished)
@@ -87,7 +88,7 @@ def finish_learned(
     ball: Surface,
     learned: Learned,
     config: PaperConfig,
-    stage: Callable[[str], None],
+    stage: Stages,
     finishing: GlobalFinishConfig,
 ) -> tuple[Finished, dict[str, Any]]:
     """Valid charts of a surface in the unit ball from a learned map, and the map's raw figures.

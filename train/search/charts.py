@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...runtime.deadline import Late, never
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
 from ..finish.fallback import unwrapped_by_xatlas
@@ -23,6 +24,7 @@ from .carry import carried_back
 from .develop import Development, unfold
 from .fine import refined
 from .labels import dual_graph
+from .notes import hurried, notes
 from .parts import Part, split_parts
 from .planar import flat_regions
 from .proof import is_valid, verify
@@ -36,10 +38,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...runtime.progress import Stages
     from ..config import FinishConfig
     from .labels import DualGraph
 
-    Stage = Callable[[str], None]
     Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -64,7 +66,7 @@ class Solved(NamedTuple):
 
 
 def chart_surface(
-    surface: Surface, charts: int, config: FinishConfig, seed: int, stage: Stage, scores: Scores | None = None
+    surface: Surface, charts: int, config: FinishConfig, seed: int, stage: Stages, scores: Scores | None = None
 ) -> Finished:
     """Valid charts of a surface.
 
@@ -73,7 +75,8 @@ def chart_surface(
         charts: the most charts a part gets, unless fewer than it needs to keep its stretch within bounds.
         config: numbers.
         seed: of the searches' first labels.
-        stage: called with the name of each stage as it begins.
+        stage: called with the name of each stage as it begins.  Once its deadline is about to pass, searches end with
+            what they have, and it is laid out on the surface in the shortest way.
         scores: (n, 3) points in the surface's units → (n, k) log chart probabilities, learned elsewhere: the one start
             of each search.  None starts from geometry.
 
@@ -84,11 +87,12 @@ def chart_surface(
     parts = split_parts(surface, config.congruence)
     total = sum(part.scale**2 for part in parts)
     stage("charts")
+    late = partial(stage.deadline.passed, config.haste.seconds + config.haste.seconds_per_face * len(surface.faces))
     first = [number for number, part in enumerate(parts) if part.copy_of < 0]
 
     def solve(number: int) -> Solved:
         part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
-        starts = Starts(part, charts, part.scale**2 / total, config, seed, scores)
+        starts = Starts(part, charts, part.scale**2 / total, config, seed, scores, late)
         return solve_part(part.surface, charts, starts, config)
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
@@ -104,28 +108,8 @@ def chart_surface(
     verify(pieces)
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
-    return Finished(pieces, objective(surface, pieces, config.slit.price), facts, notes(solved, charts, config))
-
-
-def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple[str, ...]:
-    """What a user may not expect of the parts' charts, a sentence each."""
-    found = []
-    many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts]
-    if many:
-        found.append(
-            f"{len(many)} of {len(solved)} different parts got more than {charts} charts (up to {max(many)}), since "
-            f"fewer would stretch them by more than {1.0 + config.most_excess:g} on the mean"
-        )
-    stretched = [sum(piece.energy for piece in part.pieces) for part in solved.values()]
-    if max(stretched) > config.most_excess:
-        found.append(
-            f"{sum(excess > config.most_excess for excess in stretched)} of {len(solved)} different parts keep a mean "
-            f"stretch of up to {1.0 + max(stretched):.3g}; a smaller --charts does not help, a cleaner mesh may"
-        )
-    resort = sum(piece.resort != "" for part in solved.values() for piece in part.pieces)
-    if resort:
-        found.append(f"{resort} charts were flattened by xatlas, where our own flattening found nothing valid")
-    return tuple(found)
+    told = (*hurried(stage.deadline, late), *notes(solved, charts, config))
+    return Finished(pieces, objective(surface, pieces, config.slit.price), facts, told)
 
 
 def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
@@ -170,6 +154,7 @@ class Starts:
     config: FinishConfig
     seed: int
     scores: Scores | None
+    late: Late = never
 
     @property
     def faces(self) -> int:
@@ -217,9 +202,10 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
         return exact
     many = len(surface.faces) > config.fine.above * config.fine.faces
     middle = thinned(surface, config.fine) if many else surface
-    pieces = searched_pieces(middle, charts, starts, config, exact)
-    if middle is not surface:
-        pieces = refined(surface, middle, pieces, config)
+    whole = exact is not None and len(middle.faces) <= config.whole_faces
+    coarse = middle if whole else simplified(middle, starts.faces)
+    found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
+    pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late)
     if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
         return exact
     energy = sum(piece.energy for piece in pieces)
@@ -230,18 +216,20 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     return Solved(pieces, "searched")
 
 
-def searched_pieces(
-    surface: Surface, charts: int, starts: Starts, config: FinishConfig, exact: Solved | None
+def brought_back(
+    levels: tuple[Surface, Surface, Surface], found: Search, charts: int, config: FinishConfig, late: Late
 ) -> list[Piece]:
-    """Charts of a part by a search on its simplified twin; ``exact``: its facets, another start where it is small."""
-    whole = exact is not None and len(surface.faces) <= config.whole_faces
-    coarse = surface if whole else simplified(surface, starts.faces)
-    found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
-    if coarse is not surface:
-        found = carried_back(surface, coarse, found, charts, config)
-    found.slit_all(config.slit_above, contacts=True)
-    found.polish()
-    return list(found.pieces.values())
+    """What was found on the simplified twin, on the surface itself; levels: the surface, its middle mesh, the twin."""
+    surface, middle, coarse = levels
+    if late() and coarse is not surface:
+        return refined(surface, coarse, list(found.pieces.values()), config)
+    if coarse is not middle:
+        found = carried_back(middle, coarse, found, charts, config)
+    if not late():
+        found.slit_all(config.slit_above, contacts=True)
+        found.polish()
+    pieces = list(found.pieces.values())
+    return pieces if middle is surface else refined(surface, middle, pieces, config)
 
 
 def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
@@ -253,7 +241,7 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
         search = Search(surface, graph, config)
         for piece in unfolded:
             search.add(piece)
-        search.run(charts, rounds)
+        search.run(charts, rounds, starts.late)
         searches.append(search)
     searches += searched(surface, graph, starts, starts.counts, charts, rounds)
     if starts.small and min(search.energy() for search in searches) > config.most_excess:
@@ -271,9 +259,11 @@ def searched(
         for piece in range(int(label.max()) + 1):
             search.add_valid(np.flatnonzero(label == piece))
         crowded = len(search.pieces) > starts.config.start.crowded
-        search.run(charts, rounds)
+        search.run(charts, rounds, starts.late)
         found.append(search)
-        if crowded:  # a search of so many pieces takes its time; another start would not be much better
+        if (
+            crowded or starts.late()
+        ):  # a search of so many pieces takes its time; another start would not be much better
             break
     return found
 

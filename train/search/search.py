@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...runtime.deadline import Late, never
 from ...runtime.geometry.distortion import oriented_energy
 from ..finish.contact import Relaxed, converge
 from ..finish.flaps import Trimmed, restricted
@@ -153,20 +154,24 @@ class Search(State):
         ways = [kept, self.trimmed(relaxed), self.less_flaps(self.try_piece(ids))]
         return min((way for way in ways if way is not None), key=self.cost)
 
-    def run(self, most: int, rounds: int) -> None:
-        """Merge while that pays, then down to ``most`` pieces as far as the stretch allows, then split and merge."""
+    def run(self, most: int, rounds: int, late: Late = never) -> None:
+        """Merge while that pays, then down to ``most`` pieces as far as the stretch allows, then split and merge.
+
+        Once it is ``late``, only what the limits on pieces and stretch ask for.
+        """
         self.place_loose()
-        self.split_stretched()
-        self.merge(0.0, 0)
+        if not late():
+            self.split_stretched()
+        self.merge(0.0, 0, late)
         self.merge(-np.inf, most)
         for _ in range(rounds):
-            if len(self.settled) >= self.config.vain_splits or not self.improve(most):
+            if late() or len(self.settled) >= self.config.vain_splits or not self.improve(most):
                 break
         self.split_down()
 
-    def merge(self, least: float, down_to: int) -> None:
-        """Merges that gain more than ``least``, while there are more than ``down_to`` pieces."""
-        while len(self.pieces) > down_to:
+    def merge(self, least: float, down_to: int, late: Late = never) -> None:
+        """Merges that gain more than ``least``, while there are more than ``down_to`` pieces and it is not ``late``."""
+        while len(self.pieces) > down_to and not late():
             best = self.best_merge(least)
             if best is None or (best.gain < 0.0 and self.energy() - best.gain > self.config.most_excess):
                 return

@@ -11,6 +11,7 @@ import torch
 
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Charts, Frame, Surface
+from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FitConfig, TrainConfig
 from flexpara.train.deploy.config import SampleConfig
@@ -37,10 +38,6 @@ if TYPE_CHECKING:
 
 SMALL = PaperNets(hidden=16, embedding=8)
 DEPLOY = TrainConfig(fit=FitConfig(samples=SampleConfig(per_face=1, least=4000, beside=2000)))
-
-
-def quiet(stage: str) -> None:
-    """No progress."""
 
 
 def sample(name: str, resolution: int) -> Surface:
@@ -147,7 +144,7 @@ def test_raw_figures_of_charts_leave_out_the_faces_between_them() -> None:
 def test_charts_that_nobody_takes_are_not_made() -> None:
     tube = sample("tube", 48)
     found, report = finish_learned(
-        tube, two_sides, PaperConfig(mode="multi-chart", charts=3), quiet, GlobalFinishConfig()
+        tube, two_sides, PaperConfig(mode="multi-chart", charts=3), Stages(), GlobalFinishConfig()
     )
     assert len(found.pieces) <= 2
     assert len(report["raw"]["charts"]) == 2
@@ -156,7 +153,7 @@ def test_charts_that_nobody_takes_are_not_made() -> None:
 
 def test_a_learned_tube_is_one_chart_whose_report_has_both() -> None:
     tube = sample("tube", 48)
-    found, report = finish_learned(tube, unroll, PaperConfig(), quiet, GlobalFinishConfig())
+    found, report = finish_learned(tube, unroll, PaperConfig(), Stages(), GlobalFinishConfig())
     assert len(found.pieces) == 1
     assert report["components"][0]["charts"] == 1
     assert report["raw"]["off_seam"]["conformal_mean"] > 0.0

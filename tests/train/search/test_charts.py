@@ -10,17 +10,20 @@ import pytest
 
 pytest.importorskip("igl")
 
+from flexpara.runtime.deadline import Deadline
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import components, edge_table
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
+from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FinishConfig, StartConfig
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.search import charts as module
 from flexpara.train.search.charts import Finished, chart_surface, objective
 from flexpara.train.search.proof import verify
+from flexpara.train.search.search import Search
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +34,7 @@ CONFIG = FinishConfig(surrogate_faces=300, fewest_faces=200, rounds=1, start=Sta
 
 
 def charted(surface: Surface, charts: int = 8, config: FinishConfig = CONFIG, seed: int = 0) -> Finished:
-    return chart_surface(surface, charts, config, seed, lambda _stage: None)
+    return chart_surface(surface, charts, config, seed, Stages())
 
 
 def assert_valid(found: Finished, surface: Surface) -> None:
@@ -196,7 +199,7 @@ def test_learned_scores_take_the_place_of_geometry() -> None:
         return -np.logaddexp(0.0, np.array([-9.0, 9.0]) * (points[:, 2:] - 50.0))
 
     curved = replace(CONFIG, planar=replace(CONFIG.planar, most=0))  # no unfolding is tried
-    found = chart_surface(ball, 2, curved, 0, lambda _stage: None, scores)
+    found = chart_surface(ball, 2, curved, 0, Stages(), scores)
     assert_valid(found, ball)
     assert len(asked) == 1
     np.testing.assert_allclose(asked[0], ball.triangles.mean(axis=1), atol=1e-9)
@@ -204,8 +207,32 @@ def test_learned_scores_take_the_place_of_geometry() -> None:
 
 def test_stages_are_named_in_turn() -> None:
     named: list[str] = []
-    chart_surface(Surface(*make_sample("cube", resolution=8)), 8, CONFIG, 0, named.append)
+
+    def begun(stage: str, step: int, steps: int, loss: float | None = None) -> None:
+        if (step, steps, loss) == (0, 1, None):
+            named.append(stage)
+
+    chart_surface(Surface(*make_sample("cube", resolution=8)), 8, CONFIG, 0, Stages(begun))
     assert named == ["parts", "charts", "exact check"]
+
+
+def test_a_search_that_is_asked_to_end_is_valid_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface, deadline, splits = Surface(*make_sample("trefoil", resolution=48)), Deadline(), []
+    plain = Search.improve
+    monkeypatch.setattr(Search, "improve", lambda self, most: splits.append(1) or plain(self, most))
+    deadline.ask()
+    found = chart_surface(surface, 8, CONFIG, 0, Stages(deadline=deadline))
+    assert_valid(found, surface)
+    assert splits == []
+    assert any("on request" in note for note in found.notes)
+
+
+def test_a_budget_names_itself_and_none_leaves_no_note() -> None:
+    surface = Surface(*make_sample("torus", resolution=32))
+    hurried = chart_surface(surface, 8, CONFIG, 0, Stages(deadline=Deadline(0.01)))
+    assert any("time budget of 0.01 s" in note for note in hurried.notes)
+    assert_valid(hurried, surface)
+    assert not any("ended" in note for note in chart_surface(surface, 8, CONFIG, 0, Stages()).notes)
 
 
 def test_sheets_on_one_edge_and_slivers_are_charted() -> None:

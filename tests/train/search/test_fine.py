@@ -13,6 +13,7 @@ pytest.importorskip("igl")
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, edge_table
 from flexpara.runtime.mesh import Surface
+from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FineConfig, FinishConfig
 from flexpara.train.finish.pieces import Piece, make_piece
@@ -137,15 +138,15 @@ def test_a_chart_that_touches_itself_stays_apart() -> None:
 def test_a_large_part_is_searched_on_its_middle_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = unit("torus", 64)
     seen: list[int] = []
-    plain = charts.searched_pieces
+    plain = charts.refined
 
-    def looked_at(mesh: Surface, *rest: Any) -> list[Piece]:
-        seen.append(len(mesh.faces))
-        return plain(mesh, *rest)
+    def looked_at(mesh: Surface, middle: Surface, *rest: Any) -> list[Piece]:
+        seen.append(len(middle.faces))
+        return plain(mesh, middle, *rest)
 
-    monkeypatch.setattr(charts, "searched_pieces", looked_at)
+    monkeypatch.setattr(charts, "refined", looked_at)
     config = replace(CONFIG, fine=FineConfig(faces=2000), surrogate_faces=600)
-    found = chart_surface(surface, 4, config, 0, lambda _: None)
+    found = chart_surface(surface, 4, config, 0, Stages())
     assert seen[0] < 2100 < len(surface.faces)
     label = np.zeros(len(surface.faces), dtype=np.int64)
     for number, piece in enumerate(found.pieces):

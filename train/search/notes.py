@@ -1,0 +1,40 @@
+"""What a user may not expect of the charts that were found, a sentence each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ...runtime.deadline import Deadline, Late
+    from ..config import FinishConfig
+    from .charts import Solved
+
+
+def hurried(deadline: Deadline, late: Late) -> Iterator[str]:
+    """What a user has to know of a search that a deadline ended."""
+    if late():
+        budget = "on request" if deadline.asked else f"by the time budget of {deadline.seconds:g} s"
+        yield f"the search was ended {budget}; with more time the charts may be fewer and less stretched"
+
+
+def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple[str, ...]:
+    """What a user may not expect of the parts' charts, a sentence each."""
+    found = []
+    many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts]
+    if many:
+        found.append(
+            f"{len(many)} of {len(solved)} different parts got more than {charts} charts (up to {max(many)}), since "
+            f"fewer would stretch them by more than {1.0 + config.most_excess:g} on the mean"
+        )
+    stretched = [sum(piece.energy for piece in part.pieces) for part in solved.values()]
+    if max(stretched) > config.most_excess:
+        found.append(
+            f"{sum(excess > config.most_excess for excess in stretched)} of {len(solved)} different parts keep a mean "
+            f"stretch of up to {1.0 + max(stretched):.3g}; a smaller --charts does not help, a cleaner mesh may"
+        )
+    resort = sum(piece.resort != "" for part in solved.values() for piece in part.pieces)
+    if resort:
+        found.append(f"{resort} charts were flattened by xatlas, where our own flattening found nothing valid")
+    return tuple(found)
