@@ -83,6 +83,8 @@ class StartConfig:
     """The same for a part of small share; it gets the others too, where this leaves it stretched."""
     counts_holed: tuple[float, ...] = (1.0,)
     """The same for a part of many handles."""
+    behind: float = 1.05
+    """Objective of a search begun, as a multiple of the best one's, beyond which it is not finished."""
     crowded: int = 60
     """Pieces of a start that are valid by themselves above which no further start is searched."""
     handles: int = 8

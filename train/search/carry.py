@@ -35,8 +35,7 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
         carry_piece(search, ids, found.pieces[int(keys[np.bincount(smooth[ids]).argmax()])], config)
     search.place_loose()
     search.split_stretched()
-    if len(search.pieces) > limit:
-        search.merge(-np.inf, limit)
+    search.merge(-np.inf, limit)
     search.split_down()
     return search
 

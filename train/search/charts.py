@@ -235,35 +235,35 @@ def brought_back(
 def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
     """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
-    searches = []
-    rounds = config.few_rounds if starts.small else config.rounds
+    begun = []
     if unfolded:
         search = Search(surface, graph, config)
         for piece in unfolded:
             search.add(piece)
-        search.run(charts, rounds, starts.late)
-        searches.append(search)
-    searches += searched(surface, graph, starts, starts.counts, charts, rounds)
-    if starts.small and min(search.energy() for search in searches) > config.most_excess:
-        searches += searched(surface, graph, starts, config.start.counts, charts, rounds)
-    return min(searches, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
+        search.begin(starts.late)
+        begun.append(search)
+    begun += begun_searches(surface, graph, starts, starts.counts)
+    if starts.small and min(search.energy() for search in begun) > config.most_excess:
+        begun += begun_searches(surface, graph, starts, config.start.counts)
+    costs = [search.objective() for search in begun]
+    ahead = [search for search, cost in zip(begun, costs, strict=True) if cost <= config.start.behind * min(costs)]
+    for search in ahead:
+        search.finish(charts, config.few_rounds if starts.small else config.rounds, starts.late)
+    return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
 
 
-def searched(
-    surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...], charts: int, rounds: int
-) -> list[Search]:
-    """A finished search from each start."""
+def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:
+    """A search from each start, as far as merges pay."""
     found = []
     for label in starts.labels(surface, graph, counts):
         search = Search(surface, graph, starts.config)
         for piece in range(int(label.max()) + 1):
             search.add_valid(np.flatnonzero(label == piece))
         crowded = len(search.pieces) > starts.config.start.crowded
-        search.run(charts, rounds, starts.late)
+        search.begin(starts.late)
         found.append(search)
-        if (
-            crowded or starts.late()
-        ):  # a search of so many pieces takes its time; another start would not be much better
+        # a search of so many pieces takes its time; another start would not be much better
+        if crowded or starts.late():
             break
     return found
 

@@ -154,15 +154,18 @@ class Search(State):
         ways = [kept, self.trimmed(relaxed), self.less_flaps(self.try_piece(ids))]
         return min((way for way in ways if way is not None), key=self.cost)
 
-    def run(self, most: int, rounds: int, late: Late = never) -> None:
-        """Merge while that pays, then down to ``most`` pieces as far as the stretch allows, then split and merge.
-
-        Once it is ``late``, only what the limits on pieces and stretch ask for.
-        """
+    def begin(self, late: Late = never) -> None:
+        """Split what is stretched, and merge while that pays, unless it is ``late``."""
         self.place_loose()
         if not late():
             self.split_stretched()
         self.merge(0.0, 0, late)
+
+    def finish(self, most: int, rounds: int, late: Late = never) -> None:
+        """Merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
+
+        Once it is ``late``, only what the limits on pieces and stretch ask for.
+        """
         self.merge(-np.inf, most)
         for _ in range(rounds):
             if late() or len(self.settled) >= self.config.vain_splits or not self.improve(most):

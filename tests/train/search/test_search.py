@@ -136,7 +136,8 @@ def test_a_search_ends_valid_within_its_limit_and_no_dearer_than_it_began(name: 
     surface = unit(name, 16)
     search = search_of(surface, bands(surface, 4))
     before = search.objective()
-    search.run(most, 2)
+    search.begin()
+    search.finish(most, 2)
     assert_valid(search)
     assert len(search.pieces) <= most or search.energy() <= CONFIG.most_excess
     if most == 8:
@@ -147,7 +148,8 @@ def test_a_piece_of_too_much_stretch_is_split_whatever_the_limit() -> None:
     sphere = unit("sphere", 24)
     config = replace(CONFIG, most_excess=1e-4)
     search = search_of(sphere, bands(sphere, 2), config)
-    search.run(2, 2)
+    search.begin()
+    search.finish(2, 2)
     assert len(search.pieces) > 2
     assert_valid(search)
 
