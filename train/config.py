@@ -77,7 +77,7 @@ class LabelConfig:
 class StartConfig:
     """First labels of a search: k-means of a part's faces by position and normal, at area 1."""
 
-    counts: tuple[float, ...] = (1.0, 0.0, 1.0)
+    counts: tuple[float, ...] = (1.0, 0.0, 2.0)
     """Clusters of each start, as a multiple of the charts asked for; 0 is the part as a whole."""
     counts_small: tuple[float, ...] = (0.0,)
     """The same for a part of small share; it gets the others too, where this leaves it stretched."""
