@@ -12,6 +12,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 from cyclopts import App, Parameter
@@ -25,6 +26,7 @@ from .runtime.console import Console, Manners, complain
 from .runtime.deadline import Deadline, interrupts_ask
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
+from .runtime.inputs import STREAM, from_stdin, meshes_of
 from .runtime.options import AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
 from .runtime.progress import Clock
 from .runtime.runfile import Run
@@ -70,20 +72,20 @@ def run() -> NoReturn:
 
 @app.command
 def unwrap(
-    mesh: Path | None = None,
-    *,
+    *mesh: Path,
     output: Output | None = None,
     options: Annotated[Options, CHARTS] = Options(),
     outputs: Annotated[Outputs, FILES] = Outputs(),
     checkpoints: Annotated[CheckpointOptions, Parameter(name="*")] = CheckpointOptions(),
     console: Manners = Console(),
 ) -> int:
-    """Unwrap a mesh or a point cloud into an atlas of few charts, an ONNX file and textures.
+    """Unwrap meshes or point clouds into an atlas of few charts, an ONNX file and textures each.
 
     Args:
-        mesh: A mesh (obj, ply, stl, glb, gltf, off, or what else trimesh reads), or points (ply without faces, xyz,
-            csv, npy).
-        output: The folder for STEM.glb, STEM.onnx, STEM_MAP.png or .exr, STEM.report.json and STEM.preview.png.
+        mesh: Meshes (obj, ply, stl, glb, gltf, off, or what else trimesh reads), points (ply without faces, xyz, csv,
+            npy), folders of meshes, or - for one on standard input.
+        output: The folder for STEM.glb, STEM.onnx, STEM_MAP.png or .exr, STEM.report.json and STEM.preview.png, or -
+            for one glb, obj, ply, usda or npz on standard output.
         options: See Options.
         outputs: See Outputs.
         checkpoints: See CheckpointOptions.
@@ -91,16 +93,46 @@ def unwrap(
     """
     if checkpoints.resume is not None:
         asked = mesh, output, options, outputs, checkpoints.every
-        if asked != (None, None, Options(), Outputs(), None):
+        if asked != ((), None, Options(), Outputs(), None):
             raise InputError("resume beside other options, expected none, as the run keeps its own; leave them out")
         from .runtime.runfile import find_run
 
         return _perform(find_run(checkpoints.resume), console)
-    if mesh is None or output is None:
-        missing = "--mesh" if mesh is None else "--output"
+    if not mesh or output is None:
+        missing = "--output" if mesh else "MESH"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
     options = replace(options, padding=_padding(options, outputs))
-    return _perform(Run(mesh.absolute(), output, options, outputs, checkpoints.every), console)
+    if STREAM in mesh or output == STREAM:
+        return _stream(mesh, output, options, outputs, console)
+    runs = [Run(path.absolute(), output, options, outputs, checkpoints.every) for path in meshes_of(mesh)]
+    return _perform(runs[0], console) if len(runs) == 1 else max(_one_of_several(entry, console) for entry in runs)
+
+
+def _one_of_several(run: Run, console: Console) -> int:
+    """One unwrap, whose failure keeps none of the others from being made."""
+    try:
+        return _perform(run, console)
+    except FlexparaError as error:
+        return complain(f"{run.mesh.name}: {error}", error.exit_code)
+
+
+def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outputs, console: Console) -> int:
+    """One unwrap from standard input, to standard output, or both."""
+    if len(mesh) > 1 or (output == STREAM and (len(outputs.formats) > 1 or "gltf" in outputs.formats)):
+        found = f"{len(mesh)} meshes as {', '.join(outputs.formats)}"
+        raise InputError(f"{found} through a stream, expected one mesh and one file; pass for instance --format glb")
+    with TemporaryDirectory() as folder:
+        source = from_stdin(Path(folder)) if mesh[0] == STREAM else mesh[0].absolute()
+        if output != STREAM:
+            return _perform(Run(source, output, options, outputs), console)
+        if "glb" not in outputs.formats:  # whose pictures would be files beside it
+            outputs = replace(outputs, maps=())
+        run = Run(source, Path(folder) / "out", options, replace(outputs, preview=False))
+        code = _perform(run, console, summary=False)
+        (kind,) = outputs.formats
+        sys.stdout.buffer.write((run.output / f"{source.stem}.{kind}").read_bytes())
+        sys.stdout.buffer.flush()
+    return code
 
 
 def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
@@ -108,7 +140,7 @@ def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
     return padding_of(options.padding, outputs.target, options.size, light=outputs.uv_set is not None)
 
 
-def _perform(run: Run, console: Console) -> int:
+def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
     from .runtime.io.changes import lost
@@ -137,7 +169,8 @@ def _perform(run: Run, console: Console) -> int:
         console.note_changes(result.asset)
     console.notes(result.report["train"])
     run.forget()
-    console.show({**result.report["metrics"], **result.report["network"]}, written)
+    if summary:
+        console.show({**result.report["metrics"], **result.report["network"]}, written)
     return 0
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..runtime.extras import requires
 from ..runtime.io.gltf.instances import every_instance
 from ..runtime.io.loops import loops_of
+from ..runtime.io.npz import write_npz
 from ..runtime.material import used_materials
 from ..runtime.options import SCENES
 
@@ -55,6 +56,7 @@ def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> 
         "obj": lambda path: _write_obj(flat, path),
         "ply": lambda path: _write_ply(flat, path),
         "usda": lambda path: _write_usda(flat, path),
+        "npz": lambda path: write_npz(spread, job.asset, path),
     }
     staged: dict[str, Path] = {}
 
@@ -66,6 +68,7 @@ def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> 
         output.write(f"{output.stem}.{kind}", partial(write, kind))
     from .files.written import Reading, parts_of, written_report
 
+    staged.pop("npz", None)  # the arrays themselves
     uv = job.atlas.uv[job.atlas.faces]
     order, parts = parts_of(job.asset, job.outputs.uv_set or 0)
     scenes = {kind: path for kind, path in staged.items() if kind in SCENES}

@@ -31,7 +31,7 @@ MODES = ("multi-chart", "global")
 PRECISIONS = ("float32", "bfloat16")
 ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirectional", "chart-differential")
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
-FORMATS = ("glb", "gltf", "obj", "ply", "usda")
+FORMATS = ("glb", "gltf", "obj", "ply", "usda", "npz")
 SCENES = ("glb", "gltf")
 """Formats that hold scenes."""
 POLYGONS = ("obj", "ply", "usda")
@@ -224,8 +224,8 @@ class FileOptions:
     """What is written beside the ONNX file, the maps and the report."""
 
     formats: Annotated[Names, Parameter(name="--format")] = ("glb",)
-    """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda.  glb and gltf keep all that a
-    glTF scene holds."""
+    """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda and npz (arrays, for programs).
+    glb and gltf keep all that a glTF scene holds."""
     uv_set: int | None = None
     """The uv set that the new uv become, 0 to 7, while other sets, materials and textures stay: 1 is usual for light
     maps.  By default the new uv are set 0, textures are baked onto them, and old sets follow."""
@@ -272,8 +272,8 @@ class Outputs(FileOptions, MapOptions):
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
 
     def for_points(self) -> "Outputs":
-        """The same without the triangles as ply, whose name the points have; glb where that leaves none."""
-        left = tuple(name for name in self.formats if name != "ply")
+        """The same without the triangles as ply or npz, whose names the points have; glb where that leaves none."""
+        left = tuple(name for name in self.formats if name not in ("ply", "npz"))
         return replace(self, formats=left or ("glb",))
 
 

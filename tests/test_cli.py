@@ -86,7 +86,7 @@ def test_help_and_version_end_with_0(capsys: pytest.CaptureFixture[str]) -> None
     [
         (["unwrp", "a.obj"], "unwrp"),
         (["unwrap", "a.obj"], "--output"),
-        (["unwrap", "-o", "out"], "--mesh"),
+        (["unwrap", "-o", "out"], "MESH"),
         (["unwrap", "a.obj", "-o", "out", "--charts", "many"], "many"),
         (["unwrap", "a.obj", "-o", "out", "--bogus"], "--bogus"),
         (["unwrap", "a.obj", "-o"], "-o"),
