@@ -72,8 +72,8 @@ def run() -> NoReturn:
 
 @app.command
 def unwrap(
-    *mesh: Path,
-    output: Output | None = None,
+    *mesh: Annotated[Path, Parameter(allow_leading_hyphen=True)],
+    output: Annotated[Output | None, Parameter(name=["--output", "-o"], allow_leading_hyphen=True)] = None,
     options: Annotated[Options, CHARTS] = Options(),
     outputs: Annotated[Outputs, FILES] = Outputs(),
     checkpoints: Annotated[CheckpointOptions, Parameter(name="*")] = CheckpointOptions(),
@@ -98,6 +98,8 @@ def unwrap(
         from .runtime.runfile import find_run
 
         return _perform(find_run(checkpoints.resume), console)
+    for word in (path for path in mesh if str(path).startswith("-") and path != STREAM):
+        raise InputError(f"unknown option {word}, expected those of flexpara unwrap; see flexpara unwrap --help")
     if not mesh or output is None:
         missing = "--output" if mesh else "MESH"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
@@ -129,7 +131,7 @@ def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outpu
             outputs = replace(outputs, maps=())
         run = Run(source, Path(folder) / "out", options, replace(outputs, preview=False))
         code = _perform(run, console, summary=False)
-        (kind,) = outputs.formats
+        kind = ",".join(outputs.formats)
         sys.stdout.buffer.write((run.output / f"{source.stem}.{kind}").read_bytes())
         sys.stdout.buffer.flush()
     return code
