@@ -141,6 +141,10 @@ class FineConfig:
     """Rigid steps after the first solve, which keeps the middle chart's own stretch."""
     steepest: float = 2.0
     """Stretch of a face of the middle mesh that is taken over; a sliver's may be anything."""
+    candidates: int = 8
+    """Near faces of the middle mesh that are looked at beside a slit."""
+    torn: float = 1.5
+    """How much farther apart in uv than in space two of them are where a slit runs between them."""
     contacts: int = 2
     """Steps more, in which what came to overlap is held where it was …"""
     hold: float = 1e3

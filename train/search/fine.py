@@ -27,8 +27,9 @@ from ..finish.twolevel import TwoLevel
 from ..workers import parallel_map
 from .carry import fragments_joined, smoothed_in_band, votes
 from .labels import dual_graph
-from .layout import carried_jacobians, nearest_faces
+from .layout import carried_jacobians
 from .search import Search
+from .sides import faces_beside
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -96,7 +97,7 @@ def laid_out(disk: Surface, twin: Flat, config: FinishConfig) -> NDArray[np.floa
     First with the twin's stretch, contacts and all, then as rigid as it may become without overlap.
     """
     fine = config.fine
-    nearest = nearest_faces(disk, twin.surface, config.carry)
+    nearest = faces_beside(disk, twin, config)
     coarse = weights_of(disk, twin.surface, nearest)
     solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
     rigid = RigidSteps(disk, solver)

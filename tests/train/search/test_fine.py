@@ -20,6 +20,7 @@ from flexpara.train.finish.pieces import Piece, make_piece
 from flexpara.train.search import charts, fine
 from flexpara.train.search.charts import chart_surface, objective
 from flexpara.train.search.fine import bounded, laid_out, overlapping_vertices, refined, weights_of
+from flexpara.train.search.layout import nearest_faces
 from flexpara.train.search.proxy import thinned
 
 CONFIG = FinishConfig()
@@ -88,7 +89,7 @@ def test_what_can_not_be_laid_out_is_flattened_anew(monkeypatch: pytest.MonkeyPa
 def test_weights_are_a_partition_and_hold_the_place() -> None:
     surface = unit("cloth", 40)
     middle = unit("cloth", 10)
-    nearest = fine.nearest_faces(surface, middle, CONFIG.carry)
+    nearest = nearest_faces(surface, middle, CONFIG.carry)
     weight = weights_of(surface, middle, nearest)
     assert weight.sum(axis=1) == pytest.approx(1.0)
     assert weight.data.min() >= 0.0
