@@ -110,11 +110,12 @@ def unwrap_asset(
 
     with requires("train"):
         from .export.assemble import assemble
+        from .runtime.pack.density import square_of
         from .train.presets import train_asset
 
     clock = Clock.of(progress)
     trained = train_asset(asset, options, clock, keep)
-    return UnwrapResult(asset, assemble(asset, trained, clock, size=options.size, padding=options.margin))
+    return UnwrapResult(asset, assemble(asset, trained, clock, square_of(options)))
 
 
 def unwrap_cloud(
@@ -129,11 +130,12 @@ def unwrap_cloud(
 
     with requires("train"):
         from .export.assemble import assemble
+        from .runtime.pack.density import square_of
         from .train.presets import train_cloud
 
     clock = Clock.of(progress)
     mesh, trained = train_cloud(cloud, options, clock, keep)
-    found = assemble(mesh.asset, trained, clock, size=options.size, padding=options.margin)
+    found = assemble(mesh.asset, trained, clock, square_of(options))
     return UnwrapResult(mesh.asset, found, cloud, mesh)
 
 

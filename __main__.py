@@ -234,7 +234,7 @@ def export(
         outputs: See Outputs.
         console: See Console.
     """
-    margin = replace(options, padding=_padding(options, outputs)).margin
+    options = replace(options, padding=_padding(options, outputs))
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
     from .runtime.io.changes import lost
@@ -246,9 +246,10 @@ def export(
         check_outputs(folder, outputs, chosen_maps(outputs))
         with requires("train"):
             from .export.assemble import assemble
+            from .runtime.pack.density import square_of
             from .train.saved import read_trained
         with console.progress() as progress:
-            found = assemble(asset, read_trained(trained, asset), Clock(progress), size=options.size, padding=margin)
+            found = assemble(asset, read_trained(trained, asset), Clock(progress), square_of(options))
             written = UnwrapResult(asset, found).write(folder, outputs, progress, console.note)
     console.show({**found.report["metrics"], **found.report["network"]}, written)
     return 0

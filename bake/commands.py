@@ -21,11 +21,11 @@ from ..runtime.options import (
     Names,
     Output,
     Outputs,
-    Paths,
     Seeded,
     demand,
 )
 from ..runtime.progress import Clock
+from ..runtime.words import Paths
 from .checks import check_outputs, chosen_maps, padding_of
 from .output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 

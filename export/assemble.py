@@ -16,7 +16,8 @@ from ..runtime.errors import FinishError
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Surface
 from ..runtime.pack.config import PackConfig
-from ..runtime.pack.packing import Packed, pack
+from ..runtime.pack.density import Square, pack_square
+from ..runtime.pack.packing import Packed
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
 from ..train.deploy.fit import fit_networks
@@ -55,14 +56,14 @@ class Unwrapped:
     paper: bytes | None = field(default=None, repr=False)
 
 
-def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding: int) -> Unwrapped:
-    """Pack, measure, export.
+def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Unwrapped:
+    """Pack, measure, export.   square: the atlas that is asked for.
 
     Raises: ParityError when the exported file and its networks disagree.
     """
     with clock.stage("pack"):
-        trained, packed = _valid_atlas(asset, trained, clock, size, padding)
-    atlas = packed.atlas
+        trained, packed = _valid_atlas(asset, trained, clock, square)
+    atlas, size = packed.atlas, square.size
     with clock.stage("measure"):
         metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
     report: dict[str, Any] = {
@@ -70,7 +71,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
         "version": __version__,
         "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
         "changes": asset.changes,
-        "settings": {**trained.settings, "size": size, "padding": padding},
+        "settings": {**trained.settings, **square._asdict()},
         "pack": packed.report,
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),
@@ -88,13 +89,13 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, *, size: int, padding
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
 
 
-def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, size: int, padding: int) -> tuple[Trained, Packed]:
+def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, square: Square) -> tuple[Trained, Packed]:
     """Packed charts that are valid as written; those that float32 could not hold are cut again, and all fitted anew.
 
     Raises: FinishError where charts stay invalid (a defect).
     """
     seed, config = trained.settings["seed"], PackConfig()
-    packed = pack(asset, trained.charts, size=size, padding=padding, seed=seed, config=config)
+    packed = pack_square(asset, trained.charts, square, seed, config)
     for _ in range(config.recuts):
         if len(packed.invalid) == 0:
             return trained, packed
@@ -106,7 +107,7 @@ def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, size: int, paddin
         )
         report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
         trained = replace(trained, charts=charts, networks=networks, report=report)
-        packed = pack(asset, charts, size=size, padding=padding, seed=seed, config=config)
+        packed = pack_square(asset, charts, square, seed, config)
     if len(packed.invalid):
         raise FinishError(
             f"{len(packed.invalid)} charts are not valid as written after {config.recuts} attempts, expected none; "

@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from cyclopts import Parameter
 
 from .errors import InputError
+from .words import Flag, Names, names
 
 if TYPE_CHECKING:
-    from cyclopts import Token
-
     from .mesh import Asset
 
 Chosen = TypeVar("Chosen")
@@ -44,26 +43,6 @@ LAST_SET = 7
 """Of uv sets that programs read."""
 
 
-def names(text: str) -> tuple[str, ...]:
-    """Comma-separated words; "none" is no word."""
-    return () if text == "none" else tuple(word.strip() for word in text.split(",") if word.strip())
-
-
-def _from_words(_kind: object, tokens: "Sequence[Token]") -> tuple[str, ...]:
-    return tuple(name for token in tokens for name in names(token.value))
-
-
-def _shown(value: tuple[str, ...]) -> str:
-    return ",".join(value) or "none"
-
-
-COMMA_SEPARATED = Parameter(converter=_from_words, n_tokens=1, negative="", metavar="NAME,…", show_default=_shown)
-Names = Annotated[tuple[str, ...], COMMA_SEPARATED]
-"""Several names in one word of the command line."""
-Paths = Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)]
-"""An option that may be given several times."""
-Flag = Annotated[bool, Parameter(negative="", show_default=False)]
-"""An option without a value, off unless it is given."""
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 PAPER = Parameter(group="Options of preset paper")
 """Heading in the help."""
@@ -150,10 +129,14 @@ class AtlasOptions:
     """Side of the square atlas and of its textures, 16 to 16384 texels."""
     padding: int | None = None
     """Texels that are kept free around each chart; by default what the target asks for, else size / 256, at least 2."""
+    texel_density: float | None = None
+    """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
 
     def __post_init__(self) -> None:
         (low, high), most = SIZES, self.size // 8
         demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
+        dense = self.texel_density is None or self.texel_density > 0
+        demand(dense, f"texel-density is {self.texel_density}, expected above 0; pass for instance --texel-density 512")
         demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
 
     @property

@@ -83,11 +83,22 @@ class LatticeConfig:
 
 
 @dataclass(frozen=True)
+class DensityConfig:
+    """The search for the part of the atlas that charts fill at a texel density asked for."""
+
+    more: float = 1.01
+    """How much more than the density asked for is aimed at: charts can be shrunk to it, not enlarged."""
+    tries: int = 12
+    """Sides of that part that are tried at most."""
+
+
+@dataclass(frozen=True)
 class PackConfig:
     """All of them."""
 
     place: PlaceConfig = field(default_factory=PlaceConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
+    density: DensityConfig = field(default_factory=DensityConfig)
     recuts: int = 4
     """How often charts that float32 can't hold are cut again and all are packed anew."""

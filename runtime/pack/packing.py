@@ -75,14 +75,14 @@ def pack(
     _check(asset, charts, size, padding)
     edges = outline_edges(asset.surface.faces, charts)
     first, report = _placed(charts, chart_outlines(charts, edges), size, padding, config, seed)
-    fit = partial(_fitted, asset.surface.faces, charts, edges, _Place(first, size, padding), config)
+    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(first, size, padding), config)
     fitted = fit(2.0)
     for _ in range(config.lattice.retries):
         if fitted.snapped.farthest <= fitted.slack:
             break
         fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
     snapped, placement = fitted.snapped, fitted.placement
-    atlas = _as_atlas(asset, charts, fitted, size, padding)
+    atlas = as_atlas(asset, charts, fitted, size, padding)
     report |= {
         "chart_scale": float(np.sqrt(np.linalg.det(placement[0, :, :2]))),
         "skipped_growth_steps": fitted.skipped,
@@ -112,7 +112,7 @@ def _placed(
     return np.concatenate([linear, layout.origin[:, :, None]], axis=2), limits
 
 
-def _as_atlas(asset: Asset, charts: Charts, fitted: _Fitted, size: int, padding: int) -> Atlas:
+def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, size: int, padding: int) -> Atlas:
     """The mesh with vertices doubled along seams, and the lattice points as their uv."""
     faces, source_vertex, _ = split_vertices(asset.faces, charts.face_chart, charts.corner_uv)
     uv = np.zeros((len(source_vertex), 2), dtype=np.float32)
@@ -138,7 +138,7 @@ class _Place(NamedTuple):
     padding: int
 
 
-class _Fitted(NamedTuple):
+class Fitted(NamedTuple):
     """Charts that jammed, on the lattice: faces (f, 3) over its points, one for each place of a vertex in a chart."""
 
     placement: NDArray[np.float64]
@@ -148,25 +148,37 @@ class _Fitted(NamedTuple):
     slack: float
 
 
-def _fitted(
+def fitted_charts(
     mesh: NDArray[np.int64],
     charts: Charts,
     edges: NDArray[np.bool_],
     first: _Place,
     config: PackConfig,
     slack: float,
-) -> _Fitted:
+) -> Fitted:
     """Charts of faces mesh (f, 3), grown from where they were placed and snapped to the lattice.
 
     slack: what is kept free beyond the padding, lattice units.
     """
     outlines = chart_outlines(charts, edges)
     placement, skipped = grown(first.placement, outlines, first.size, first.padding, config.growth, slack=slack / STEPS)
+    faces, snapped = on_lattice(mesh, charts, edges, placement, config)
+    return Fitted(placement, skipped, snapped, faces, slack)
+
+
+def on_lattice(
+    mesh: NDArray[np.int64],
+    charts: Charts,
+    edges: NDArray[np.bool_],
+    placement: NDArray[np.float64],
+    config: PackConfig,
+) -> tuple[NDArray[np.int64], Snapped]:
+    """Charts of faces mesh (f, 3) where they are placed (k, 2, 3): faces over places of vertices, and these snapped."""
     faces, _, flat = split_vertices(mesh, charts.face_chart, charts.corner_uv)
     chart = np.zeros(len(flat), dtype=np.int64)
     chart[faces] = charts.face_chart[:, None]
     uv = apply_placement(placement, chart, flat[:, None])[:, 0]
-    return _Fitted(placement, skipped, snap(uv, faces, charts.face_chart, edges, config.lattice), faces, slack)
+    return faces, snap(uv, faces, charts.face_chart, edges, config.lattice)
 
 
 def atlas_from_uv(asset: Asset) -> Atlas:

@@ -1,0 +1,101 @@
+"""Packing at a texel density that is asked for: the same on several meshes, whatever their atlases could hold.
+
+Density: texels per unit of length of the source.  Charts that don't need the whole atlas for it fill a part of it, from
+the lower left corner.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from .config import PackConfig
+from .lattice import STEPS
+from .outlines import outline_edges
+from .packing import Fitted, Packed, as_atlas, on_lattice, pack
+
+if TYPE_CHECKING:
+    from ..mesh import Asset, Charts
+    from ..options import AtlasOptions
+
+
+class Square(NamedTuple):
+    """What is asked of an atlas: size and padding in texels; texels per unit of the source, None as many as fit."""
+
+    size: int
+    padding: int
+    texel_density: float | None = None
+
+
+def square_of(options: AtlasOptions) -> Square:
+    """The atlas that options ask for."""
+    return Square(options.size, options.margin, options.texel_density)
+
+
+def pack_square(
+    asset: Asset, charts: Charts, square: Square, seed: int = 0, config: PackConfig | None = None
+) -> Packed:
+    """As ``packing.pack``, at the density asked for.
+
+    Raises: as `pack`; InputError where the atlas is too small for that density.
+    """
+    config = config or PackConfig()
+    packed = pack(asset, charts, size=square.size, padding=square.padding, seed=seed, config=config)
+    if square.texel_density is None:
+        return packed
+    most = packed.report["chart_scale"] * square.size
+    wanted = square.texel_density
+    if wanted > most:
+        size = 2 ** math.ceil(math.log2(square.size * wanted / most))
+        raise InputError(
+            f"texel-density is {wanted:g}, expected at most {most:.4g} in {square.size} texels; pass --size {size} or "
+            "a lower density"
+        )
+    found = _filled_part(asset, charts, square, packed, seed, config)
+    return _shrunk(asset, charts, square, found, wanted / (found.report["chart_scale"] * square.size), config)
+
+
+def _filled_part(asset: Asset, charts: Charts, square: Square, whole: Packed, seed: int, config: PackConfig) -> Packed:
+    """The charts in the smallest atlas in which they reach the density asked for.
+
+    whole: them in the whole atlas.  They have a texel more of padding, which shrinking to that very density may take.
+    """
+    wanted, low, high, best = square.texel_density or 0.0, 0.0, float(square.size), whole
+    dense = {0.0: 0.0, high: whole.report["chart_scale"] * square.size}
+    for _ in range(config.density.tries):
+        if best is not whole and wanted * (square.padding + 1) >= dense[high] * square.padding:
+            break
+        share = (wanted * config.density.more - dense[low]) / (dense[high] - dense[low])
+        side = float(round(low + min(max(share, 0.1), 0.9) * (high - low)))
+        if not low < side < high:
+            break
+        found = _reached(asset, charts, side, square.padding + 1, seed, config)
+        dense[side] = 0.0 if found is None else found.report["chart_scale"] * side
+        low, high, best = (side, high, best) if found is None or dense[side] < wanted else (low, side, found)
+    return best
+
+
+def _reached(asset: Asset, charts: Charts, side: float, padding: int, seed: int, config: PackConfig) -> Packed | None:
+    """The charts in an atlas of that side, None where the padding leaves no room for them."""
+    try:
+        return pack(asset, charts, size=int(side), padding=padding, seed=seed, config=config)
+    except InputError:
+        return None
+
+
+def _shrunk(asset: Asset, charts: Charts, square: Square, found: Packed, factor: float, config: PackConfig) -> Packed:
+    """The charts of an atlas as a part of another: uv × factor."""
+    assert found.atlas.placement is not None
+    placement = found.atlas.placement * factor
+    edges = outline_edges(asset.surface.faces, charts)
+    faces, snapped = on_lattice(asset.surface.faces, charts, edges, placement, config)
+    fitted = Fitted(placement, found.report["skipped_growth_steps"], snapped, faces, 0.0)
+    atlas = as_atlas(asset, charts, fitted, square.size, square.padding)
+    report = {**found.report, "settings": asdict(config), "invalid_charts": snapped.invalid.tolist()}
+    report["chart_scale"] = float(np.sqrt(np.linalg.det(placement[0, :, :2])))
+    report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
+    return Packed(atlas, snapped.invalid, report)
