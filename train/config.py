@@ -105,10 +105,10 @@ class StartConfig:
 
 @dataclass(frozen=True)
 class CarryConfig:
-    """From the simplified twin back to the surface."""
+    """From the proxy back to the surface."""
 
     neighbours: int = 3
-    """Nearest faces of the twin that vote for a face's label."""
+    """Nearest faces of the proxy that vote for a face's label."""
     normal_weight: float = 0.1
     """Weight of the unit normal against the position, at area 1, in that distance."""
     band: int = 4
@@ -120,7 +120,7 @@ class CarryConfig:
     islet: float = 0.001
     """Share of a part below which a fragment of a label joins a neighbour."""
     rigid_steps: int = 4
-    """Steps of as-rigid-as-possible flattening from the twin's rotations."""
+    """Steps of as-rigid-as-possible flattening from the proxy's rotations."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class FinishConfig:
     """Triangles thinner than the numbers that hold them."""
     congruence: float = 1e-5
     """Distance, as a share of its size, up to which a part is a copy of another."""
-    surrogate_faces: int = 2500
+    proxy_faces: int = 2500
     """Faces of the simplified surface on which charts are split and merged."""
     whole_faces: int = 8000
     """Faces up to which a part that unfolds is searched as it is, not simplified."""
@@ -204,7 +204,7 @@ class FinishConfig:
     handles_per_cluster: float = 2.0
     """Handles that a first cluster may have: a part with more starts from more clusters than charts were asked for."""
     carry: CarryConfig = field(default_factory=CarryConfig)
-    """From the simplified twin back to the surface."""
+    """From the proxy back to the surface."""
     fine: FineConfig = field(default_factory=FineConfig)
     """Parts of many faces."""
     haste: HasteConfig = field(default_factory=HasteConfig)

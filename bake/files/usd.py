@@ -109,20 +109,8 @@ def _tuples(rows: NDArray[np.floating]) -> str:
 
 def _material_text(root: str, asset: Asset, textures: Mapping[str, str], *, alpha: bool) -> str:
     """The material: a preview surface, a reader of st, and one texture reader a file."""
-    known = {product: name for product, name in textures.items() if product in INPUTS}
-    inputs, readers = _factors(asset, set(known)), []
     base = f"/{root}/material"
-    for product, name in known.items():
-        reader = prim_name(product)
-        outputs = {channels: kind for _, kind, channels, _ in INPUTS[product]}
-        for slot, kind, channels, _ in INPUTS[product]:
-            inputs[slot] = f"{kind} inputs:{slot}.connect = <{base}/{reader}.outputs:{channels}>"
-        if product == "base-color" and alpha:
-            outputs["a"] = "float"
-            inputs["opacity"] = f"float inputs:opacity.connect = <{base}/{reader}.outputs:a>"
-            inputs.update(_cutoff(asset))
-        scale = emissive_strength(asset) if product == "emissive" else 1.0
-        readers.append(_reader_text(base, reader, name, product, outputs, scale))
+    inputs, readers = _connected(base, asset, textures, alpha=alpha)
     surface = "\n".join(f"            {line}" for line in inputs.values())
     return f"""    def Material "material"
     {{
@@ -142,6 +130,26 @@ def _material_text(root: str, asset: Asset, textures: Mapping[str, str], *, alph
             float2 outputs:result
         }}
 {"".join(readers)}    }}"""
+
+
+def _connected(
+    base: str, asset: Asset, textures: Mapping[str, str], *, alpha: bool
+) -> tuple[dict[str, str], list[str]]:
+    """Input → line of the surface, by factors or connected to a texture; and the texture readers."""
+    known = {product: name for product, name in textures.items() if product in INPUTS}
+    inputs, readers = _factors(asset, set(known)), []
+    for product, name in known.items():
+        reader = prim_name(product)
+        outputs = {channels: kind for _, kind, channels, _ in INPUTS[product]}
+        for slot, kind, channels, _ in INPUTS[product]:
+            inputs[slot] = f"{kind} inputs:{slot}.connect = <{base}/{reader}.outputs:{channels}>"
+        if product == "base-color" and alpha:
+            outputs["a"] = "float"
+            inputs["opacity"] = f"float inputs:opacity.connect = <{base}/{reader}.outputs:a>"
+            inputs.update(_cutoff(asset))
+        scale = emissive_strength(asset) if product == "emissive" else 1.0
+        readers.append(_reader_text(base, reader, name, product, outputs, scale))
+    return inputs, readers
 
 
 def _factors(asset: Asset, products: set[str]) -> dict[str, str]:

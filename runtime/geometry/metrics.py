@@ -113,7 +113,6 @@ def measure(
     shared = overlap_area(corner_uv, pairs)
     square, square_area = _square(corner_uv)
     total_uv = float(np.abs(signed_areas(corner_uv)).sum())
-    lengths = np.linalg.norm(np.diff(surface.vertices[table.edges[seam]], axis=1)[:, 0], axis=1)
     meets = bool(np.any(chart[pairs[:, 0]] != chart[pairs[:, 1]]))
     gap = _gap_texels(corner_uv, chart, _outline(table, seam), meets, size)
     return Metrics(
@@ -122,7 +121,7 @@ def measure(
         **_texel_density(surface, corner_uv, area, size),
         overlap_fraction=shared / total_uv,
         charts=int(chart.max()) + 1,
-        seam_length=float(lengths.sum() / math.sqrt(surface.face_areas().sum())),
+        seam_length=_seam_length(surface, table.edges[seam]),
         seam_edges=int(seam.sum()),
         packing_efficiency=max(total_uv - shared, 0.0) / square_area,
         packing_square=square,
@@ -234,6 +233,12 @@ def _orientation_counts(
         "degenerate_uv_faces": int(((np.abs(signed) <= 1e-12 * np.abs(signed).mean()) & solid).sum()),
         "mirrored_charts": int((total < 0.0).sum()),
     }
+
+
+def _seam_length(surface: Surface, edges: NDArray[np.int64]) -> float:
+    """Length of edges (e, 2) in space, over √area."""
+    lengths = np.linalg.norm(np.diff(surface.vertices[edges], axis=1)[:, 0], axis=1)
+    return float(lengths.sum() / math.sqrt(surface.face_areas().sum()))
 
 
 def _square(corner_uv: NDArray[np.float64]) -> tuple[str, float]:

@@ -1,4 +1,4 @@
-"""Large sparse systems by conjugate gradients, with a small twin that answers what varies slowly.
+"""Large sparse systems by conjugate gradients, with a small system that answers what varies slowly.
 
 A · x = b is symmetric positive definite over n fine unknowns; the rows of P (n, m) are weights, adding up to 1, of m
 coarse ones.  The preconditioner D⁻¹ + P (Pᵀ A P)⁻¹ Pᵀ is the additive two-level one (Bramble, Pasciak & Xu 1990):
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class TwoLevel:
-    """Solves with one matrix: its coarse twin is factorized once."""
+    """Solves with one matrix: the small one is factorized once."""
 
     def __init__(self, matrix: sparse.csr_array, coarse: sparse.csr_array, tolerance: float, most: int) -> None:
         """``coarse`` (n, m): P.  tolerance: of the residual, as a share of a given size; most: steps of a solve."""

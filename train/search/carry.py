@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:
-    """The pieces and slits of the coarse twin, on the surface itself."""
+    """The pieces and slits of the proxy, on the surface itself."""
     keys, label = np.unique(found.label(), return_inverse=True)
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     areas = surface.face_areas()
@@ -79,7 +79,7 @@ def carried_ways(
 
 
 def votes(coarse: Surface, label: NDArray[np.int64], surface: Surface, config: CarryConfig) -> NDArray[np.float64]:
-    """(f, k) share of each label (c,) among the nearest faces of the twin."""
+    """(f, k) share of each label (c,) among the nearest faces of the proxy."""
     nearest = KDTree(features(coarse, config)).query(features(surface, config), k=config.neighbours)[1]
     near = label[np.reshape(nearest, (len(surface.faces), config.neighbours))]
     return np.stack([(near == k).mean(axis=1) for k in range(int(label.max()) + 1)], axis=1)

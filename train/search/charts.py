@@ -158,8 +158,8 @@ class Starts:
 
     @property
     def faces(self) -> int:
-        """Faces of the simplified twin."""
-        most = self.config.surrogate_faces
+        """Faces of the proxy."""
+        most = self.config.proxy_faces
         plain = int(np.clip(most * np.sqrt(self.share), min(self.config.fewest_faces, most), most))
         return max(plain, self.config.faces_per_handle * self.handles)
 
@@ -183,7 +183,7 @@ class Starts:
         return start.counts_small if self.small else start.counts
 
     def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
-        """Connected pieces (f,), numbered 0…, of the twin, one start after the other."""
+        """Connected pieces (f,), numbered 0…, of the proxy, one start after the other."""
         config = self.config
         if self.scores is not None:
             points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
@@ -219,7 +219,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
 def brought_back(
     levels: tuple[Surface, Surface, Surface], found: Search, charts: int, config: FinishConfig, late: Late
 ) -> list[Piece]:
-    """What was found on the simplified twin, on the surface itself; levels: the surface, its middle mesh, the twin."""
+    """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy."""
     surface, middle, coarse = levels
     if late() and coarse is not surface:
         return refined(surface, coarse, list(found.pieces.values()), config)

@@ -1,7 +1,7 @@
 """From a middle mesh, thinned but searched and finished, to the fine surface itself.   f faces · v vertices · area 1.
 
-A fine chart differs from its twin on the middle mesh in detail only.  It takes the twin's rotations, and rigid steps by
-conjugate gradients with the twin as coarse level lay it out: no factorization and no SLIM ever sees the fine surface.
+A fine chart differs from its chart on the middle mesh in detail only.  It takes that one's rotations, and rigid steps
+by conjugate gradients lay it out, that one being the coarse level: no factorization or SLIM sees the fine surface.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig) -> list[Piece]:
-    """The charts of the middle mesh on the surface; one that can't be laid out like its twin is flattened anew."""
+    """The charts of the middle mesh on the surface; one that can't be laid out as there is flattened anew."""
     label = np.zeros(len(middle.faces), dtype=np.int64)
     for number, piece in enumerate(pieces):
         label[piece.ids] = number
@@ -50,59 +50,59 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
     smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
     joined = fragments_joined(smooth, areas, graph, config.carry.islet)
     groups = [np.flatnonzero(joined == number) for number in range(int(joined.max()) + 1)]
-    twins = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
+    sources = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
     total = float(areas.sum())
-    found = parallel_map(lambda number: refined_piece(surface, groups[number], twins[number], total, config), order)
+    found = parallel_map(lambda number: refined_piece(surface, groups[number], sources[number], total, config), order)
     search = None
     for number, piece in zip(order, found, strict=True):
         if piece is not None:
             continue
         search = search or Search(surface, graph, config)
-        search.add_valid(groups[number], twins[number].slits)
+        search.add_valid(groups[number], sources[number].slits)
     if search is not None:
         search.place_loose()
     return [piece for piece in found if piece is not None] + ([] if search is None else list(search.pieces.values()))
 
 
 def refined_piece(
-    surface: Surface, ids: NDArray[np.int64], twin: Piece, total: float, config: FinishConfig
+    surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig
 ) -> Piece | None:
-    """The faces ids (m,) laid out like their twin, of lowest cost; None where no way to open them is valid so."""
+    """The faces ids (m,) laid out as on the middle mesh, of lowest cost; None where no way to open them is valid so."""
     whole = extract(surface, ids)
     best: Piece | None = None
-    for disk in opened_alike(whole, twin, config):
-        uv = laid_out(disk, twin.flat, config)
+    for disk in opened_alike(whole, source, config):
+        uv = laid_out(disk, source.flat, config)
         if uv is None:
             continue
-        piece = replace(measured(surface, ids, Flat(disk, uv, {}), total, twin.slits), resort=twin.resort)
+        piece = replace(measured(surface, ids, Flat(disk, uv, {}), total, source.slits), resort=source.resort)
         if best is None or piece.cost(config.slit.price) < best.cost(config.slit.price):
             best = piece
-    allowed = config.carry.worse * twin.energy + config.carry.slack * float(whole.face_areas().sum()) / total
+    allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     return best if best is not None and best.energy <= allowed else None
 
 
-def opened_alike(whole: Surface, twin: Piece, config: FinishConfig) -> Iterator[Surface]:
-    """The ways to open a piece that leave as many borders as its twin has; all ways where none does."""
-    slit = slit_along(whole, twin.slits, config.slit)
+def opened_alike(whole: Surface, source: Piece, config: FinishConfig) -> Iterator[Surface]:
+    """The ways to open a piece that leave as many borders as there are on the middle mesh; all where none does."""
+    slit = slit_along(whole, source.slits, config.slit)
     ways = [opening.disk for opening in openings(slit, config.slit.seams)]
-    loops = len(boundary_loops(twin.flat.surface.faces))
+    loops = len(boundary_loops(source.flat.surface.faces))
     alike = [way for way in ways if len(boundary_loops(way.faces)) == loops]
     yield from alike or ways
 
 
-def laid_out(disk: Surface, twin: Flat, config: FinishConfig) -> NDArray[np.float64] | None:
-    """Uv (v, 2) of an opened piece, like its twin's, without flips and overlap; None where that can't be had.
+def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.float64] | None:
+    """Uv (v, 2) of an opened piece, as on the middle mesh, without flips and overlap; None where that can't be had.
 
-    First with the twin's stretch, contacts and all, then as rigid as it may become without overlap.
+    First with the middle mesh's stretch, contacts and all, then as rigid as it may become without overlap.
     """
     fine = config.fine
-    nearest = faces_beside(disk, twin, config)
-    coarse = weights_of(disk, twin.surface, nearest)
+    nearest = faces_beside(disk, source, config)
+    coarse = weights_of(disk, source.surface, nearest)
     solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
     rigid = RigidSteps(disk, solver)
     valid = None
-    uv = rigid.solve(bounded(carried_jacobians(disk, twin, nearest), fine.steepest), coarse @ twin.uv)
+    uv = rigid.solve(bounded(carried_jacobians(disk, source, nearest), fine.steepest), coarse @ source.uv)
     touching = np.zeros(len(uv), dtype=bool)
     for _ in range(fine.steps + fine.contacts):
         flat = evened_out(disk.faces, uv, config.slit.contact.unfolding)
@@ -138,15 +138,15 @@ def solver_with(coarse: sparse.csr_array, tolerance: float, most: int, matrix: s
     return TwoLevel(matrix, coarse, tolerance, most).solve
 
 
-def weights_of(disk: Surface, twin: Surface, nearest: NDArray[np.int64]) -> sparse.csr_array:
-    """(v, w) weights of the twin's vertices at those of a piece: barycentric in the nearest (f,) of a face around it.
+def weights_of(disk: Surface, source: Surface, nearest: NDArray[np.int64]) -> sparse.csr_array:
+    """(v, w) weights of coarse vertices at those of a piece: barycentric in the nearest (f,) of a face around it.
 
     Clipped to the triangle: no weight is negative, and they add up to 1.
     """
     count = len(disk.vertices)
     face = np.zeros(count, dtype=np.int64)
     face[disk.faces.reshape(-1)] = np.repeat(nearest, 3)
-    corner = twin.triangles[face]
+    corner = source.triangles[face]
     first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     offset = disk.vertices - corner[:, 0]
     a, b, c = (np.einsum("vc,vc->v", x, y) for x, y in ((first, first), (first, second), (second, second)))
@@ -155,5 +155,5 @@ def weights_of(disk: Surface, twin: Surface, nearest: NDArray[np.int64]) -> spar
     one, two = (c * p - b * q) / determinant, (a * q - b * p) / determinant
     weight = np.clip(np.stack([1.0 - one - two, one, two], axis=1), 0.0, 1.0)
     weight /= weight.sum(axis=1, keepdims=True)
-    entries = weight.reshape(-1), (np.repeat(np.arange(count), 3), twin.faces[face].reshape(-1))
-    return sparse.csr_array(entries, shape=(count, len(twin.vertices)))
+    entries = weight.reshape(-1), (np.repeat(np.arange(count), 3), source.faces[face].reshape(-1))
+    return sparse.csr_array(entries, shape=(count, len(source.vertices)))

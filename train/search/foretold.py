@@ -50,7 +50,8 @@ class Foretold:
 
         Joined along a second run too, they would be a tube or a handle, which has to be cut open again.
         """
-        shared = np.intersect1d(*(self.table.face_edges[piece.ids].reshape(-1) for piece in (first, second)))
+        one, two = (self.table.face_edges[piece.ids].reshape(-1) for piece in (first, second))
+        shared = np.intersect1d(one, two)
         shared = shared[self.table.manifold[shared]]
         ends = self.table.edges[shared]
         used, index = np.unique(ends, return_inverse=True)

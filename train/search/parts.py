@@ -51,9 +51,9 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
         part = extracted(surface.vertices[old], faces, ids)
         for mirrored in (False, True):
             key = pattern(part.surface.faces, mirrored=mirrored)
-            twin = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
-            if twin >= 0:
-                part = part._replace(copy_of=twin, mirrored=mirrored)
+            same = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
+            if same >= 0:
+                part = part._replace(copy_of=same, mirrored=mirrored)
                 break
         if part.copy_of < 0:
             known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(len(parts))

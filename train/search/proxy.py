@@ -1,4 +1,4 @@
-"""A simplified twin of a surface for decisions that need no detail, and the way of its labels back.
+"""The proxy: a simplified copy of a surface for decisions that need no detail, and the way of its labels back.
 
 Splitting and merging weighs dozens of flattenings; on a few thousand faces each takes hundredths of a second.
 """

@@ -1,6 +1,6 @@
-"""Which face of a twin answers for each face of a piece, on the right side of the twin's slits.   f faces.
+"""Which coarse face answers for each face of a piece, on the right side of the coarse piece's slits.   f faces.
 
-Next to a slit the nearest face of the twin may lie on the slit's other side, turned and placed elsewhere in uv.  Faces
+Next to a slit the nearest coarse face may lie on the slit's other side, turned and placed elsewhere in uv.  Faces
 there take, of several near ones, the face whose map goes on from that of their neighbour farther in.
 """
 
@@ -24,31 +24,31 @@ if TYPE_CHECKING:
     from ..finish.slits import Flat
 
 
-class TwinMap:
-    """The map of a twin, face by face, as it goes on beyond each: uv of points near a face."""
+class CoarseMap:
+    """The map of a coarse piece, face by face, as it goes on beyond each: uv of points near a face."""
 
-    def __init__(self, twin: Flat) -> None:
-        self.place = twin.surface.triangles.mean(axis=1)
-        self.uv = twin.uv[twin.surface.faces].mean(axis=1)
-        self.slope = jacobians(twin.surface, twin.uv) @ face_frames(twin.surface)[:, :2]
+    def __init__(self, source: Flat) -> None:
+        self.place = source.surface.triangles.mean(axis=1)
+        self.uv = source.uv[source.surface.faces].mean(axis=1)
+        self.slope = jacobians(source.surface, source.uv) @ face_frames(source.surface)[:, :2]
 
     def __call__(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Uv (…, 2) of points (…, 3) by the maps of faces (…)."""
         return self.uv[face] + np.einsum("...ij,...j->...i", self.slope[face], points - self.place[face])
 
 
-def faces_beside(disk: Surface, twin: Flat, config: FinishConfig) -> NDArray[np.int64]:
-    """(f,) the face of the twin that answers for each face of a piece opened like it."""
-    chosen = nearest_faces(disk, twin.surface, config.carry)
-    on_rim = np.zeros(len(twin.surface.vertices), dtype=bool)
-    on_rim[boundary_edges(twin.surface.faces)] = True
-    rim = np.flatnonzero(on_rim[twin.surface.faces[chosen]].any(axis=1))
-    count = min(config.fine.candidates, len(twin.surface.faces))
+def faces_beside(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.int64]:
+    """(f,) the coarse face that answers for each face of a piece opened like it."""
+    chosen = nearest_faces(disk, source.surface, config.carry)
+    on_rim = np.zeros(len(source.surface.vertices), dtype=bool)
+    on_rim[boundary_edges(source.surface.faces)] = True
+    rim = np.flatnonzero(on_rim[source.surface.faces[chosen]].any(axis=1))
+    count = min(config.fine.candidates, len(source.surface.faces))
     if len(rim) == 0 or count < 2:
         return chosen
-    tree = KDTree(features(twin.surface, config.carry))
+    tree = KDTree(features(source.surface, config.carry))
     near = np.asarray(tree.query(features(disk, config.carry)[rim], k=count)[1], dtype=np.int64)
-    mapped = TwinMap(twin)
+    mapped = CoarseMap(source)
     points = disk.triangles.mean(axis=1)
     torn = torn_apart(mapped, near, config.fine.torn)
     rim, near = rim[torn], near[torn]
@@ -71,8 +71,8 @@ def faces_beside(disk: Surface, twin: Flat, config: FinishConfig) -> NDArray[np.
         row[face] = -1
 
 
-def torn_apart(mapped: TwinMap, near: NDArray[np.int64], torn: float) -> NDArray[np.bool_]:
-    """(n,) bool: of near faces (n, k) of the twin, some lie much farther apart in uv than in space."""
+def torn_apart(mapped: CoarseMap, near: NDArray[np.int64], torn: float) -> NDArray[np.bool_]:
+    """(n,) bool: of near coarse faces (n, k), some lie much farther apart in uv than in space."""
     place, uv = mapped.place[near], mapped.uv[near]
     apart = np.linalg.norm(place - place[:, :1], axis=2)
     return (np.linalg.norm(uv - uv[:, :1], axis=2) > torn * apart).any(axis=1)

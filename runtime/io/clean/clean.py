@@ -51,17 +51,20 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
         "coincident_faces": int(np.count_nonzero(lies_on)),
         "flipped_faces": int(np.count_nonzero(flip)),
     }
-    whole = replace(
-        part,
-        faces=_turned(part.faces[kept], flip),
-        face_material=None if part.face_material is None else part.face_material[kept],
-        part=None if part.part is None else part.part[kept],
-        polygons=None
-        if part.polygons is None
-        else replace(part.polygons, corner=_turned(part.polygons.corner[kept], flip)),
-        changes={**part.changes, **counts},
-    )
+    whole = replace(_with_faces(part, kept, flip), changes={**part.changes, **counts})
     return _asset(whole, _turned(sheets, flip), stem=stem, sha256=sha256)
+
+
+def _with_faces(raw: RawMesh, kept: NDArray[np.int64], flip: NDArray[np.bool_]) -> RawMesh:
+    """The faces kept (m,), some of them turned, with all that is said of each."""
+    polygons = raw.polygons
+    return replace(
+        raw,
+        faces=_turned(raw.faces[kept], flip),
+        face_material=None if raw.face_material is None else raw.face_material[kept],
+        part=None if raw.part is None else raw.part[kept],
+        polygons=None if polygons is None else replace(polygons, corner=_turned(polygons.corner[kept], flip)),
+    )
 
 
 def _turned(faces: NDArray[np.int64], flip: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -69,21 +72,8 @@ def _turned(faces: NDArray[np.int64], flip: NDArray[np.bool_]) -> NDArray[np.int
 
 
 def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -> Asset:
-    """The asset; sheets (f, 3) are its faces as surface vertices.
-
-    A file vertex that belongs to several sheets is split: the first stays in its place, the others go to the end.
-    """
-    pair = equal_rows(np.stack([raw.faces.ravel(), sheets.ravel()], axis=1))
-    first = first_of_each(pair)
-    vertex = raw.faces.ravel()[first]
-    _, earliest = np.unique(vertex[np.argsort(first)], return_index=True)
-    later = np.ones(len(first), dtype=np.bool_)
-    later[np.argsort(first)[earliest]] = False
-    order = np.lexsort((first, vertex, later))
-    number = np.zeros(len(order), dtype=np.int64)
-    number[order] = np.arange(len(order))
-    part = with_vertices(raw, vertex[order], number[pair].reshape(-1, 3))
-    weld = by_first_appearance(sheets.ravel()[first][order])
+    """The asset; sheets (f, 3) are its faces as surface vertices."""
+    part, weld = _split_at_sheets(raw, sheets)
     surface = Surface(vertices=part.positions[first_of_each(weld)], faces=weld[part.faces])
     normals, repaired = _repaired_normals(part.normals, surface, weld)
     uv, moved = _finite_uv(part.uv)
@@ -107,6 +97,24 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         polygons=part.polygons,
         obj=part.obj,
     )
+
+
+def _split_at_sheets(raw: RawMesh, sheets: NDArray[np.int64]) -> tuple[RawMesh, NDArray[np.int64]]:
+    """The mesh with each vertex in one sheet only, and the surface vertex (n,) of each.
+
+    A file vertex that belongs to several sheets is split: the first stays in its place, the others go to the end.
+    """
+    pair = equal_rows(np.stack([raw.faces.ravel(), sheets.ravel()], axis=1))
+    first = first_of_each(pair)
+    vertex = raw.faces.ravel()[first]
+    _, earliest = np.unique(vertex[np.argsort(first)], return_index=True)
+    later = np.ones(len(first), dtype=np.bool_)
+    later[np.argsort(first)[earliest]] = False
+    order = np.lexsort((first, vertex, later))
+    number = np.zeros(len(order), dtype=np.int64)
+    number[order] = np.arange(len(order))
+    part = with_vertices(raw, vertex[order], number[pair].reshape(-1, 3))
+    return part, by_first_appearance(sheets.ravel()[first][order])
 
 
 def _repaired_normals(

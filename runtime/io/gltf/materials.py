@@ -72,16 +72,10 @@ def _material(
     changes: dict[str, int],
 ) -> Material:
     """One material; known and changes grow."""
-    infos, first = _texture_infos(entry), uv_set(entry)
-    pictures: dict[Slot, Picture] = {}
-    unread: dict[Slot, str] = {}
-    for slot, info in infos.items():
-        pixels = _pixels(file, info, known)
-        if isinstance(pixels, str) or _coordinates(info) != first:
-            changes["textures_not_decoded" if isinstance(pixels, str) else "textures_of_other_uv"] += 1
-            unread[slot] = pixels if isinstance(pixels, str) else ""
-        else:
-            pictures[slot] = _picture(file, info, pixels)
+    infos = _texture_infos(entry)
+    pictures, unread = _pictures(file, infos, uv_set(entry), known)
+    for reason in unread.values():
+        changes["textures_not_decoded" if reason else "textures_of_other_uv"] += 1
     surface = entry.get("pbrMetallicRoughness", {})
     red, green, blue, alpha = (_unit(value) for value in surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     strength = max(finite(entry.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0)), 0.0)
@@ -101,6 +95,23 @@ def _material(
         double_sided=bool(entry.get("doubleSided", False)),
         unread=unread,
     )
+
+
+def _pictures(
+    file: GltfFile, infos: dict[Slot, dict[str, Any]], uv: int, known: dict[int, NDArray[np.uint8]]
+) -> tuple[dict[Slot, Picture], dict[Slot, str]]:
+    """The textures that can be read over a set of uv, and why others can't: "" where they lie on other uv."""
+    pictures: dict[Slot, Picture] = {}
+    unread: dict[Slot, str] = {}
+    for slot, info in infos.items():
+        pixels = _pixels(file, info, known)
+        if isinstance(pixels, str):
+            unread[slot] = pixels
+        elif _coordinates(info) != uv:
+            unread[slot] = ""
+        else:
+            pictures[slot] = _picture(file, info, pixels)
+    return pictures, unread
 
 
 def _unit(value: Any) -> float:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 QUICK = TrainConfig(
     charts=4,
-    finish=FinishConfig(surrogate_faces=800, rounds=1),
+    finish=FinishConfig(proxy_faces=800, rounds=1),
     fit=FitConfig(samples=SampleConfig(per_face=1, least=1000, beside=500)),  # the networks play no part here
 )
 

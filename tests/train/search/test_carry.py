@@ -1,4 +1,4 @@
-"""Back from the simplified twin: labels, slivers of labels, and a flattening carried as rotations."""
+"""Back from the proxy: labels, slivers of labels, and a flattening carried as rotations."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:
 
 
 def test_shares_are_a_partition() -> None:
-    sphere, twin = sample("sphere", 24), sample("sphere", 12)
-    share = votes(twin, np.arange(len(twin.faces)) % 5, sphere, CARRY)
+    sphere, proxy = sample("sphere", 24), sample("sphere", 12)
+    share = votes(proxy, np.arange(len(proxy.faces)) % 5, sphere, CARRY)
     assert share.shape == (len(sphere.faces), 5)
     assert share.sum(axis=1) == pytest.approx(1.0)
     assert (share >= 0.0).all()
@@ -63,8 +63,8 @@ def test_shares_are_a_partition() -> None:
 
 def test_two_colours_of_a_sphere_come_back_right() -> None:
     sphere = sample("sphere", 96)
-    twin = simplified(sphere, 1000)
-    share = votes(twin, (twin.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere, CARRY)
+    proxy = simplified(sphere, 1000)
+    share = votes(proxy, (proxy.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere, CARRY)
     height = sphere.triangles.mean(axis=1)[:, 2]
     clear = np.abs(height) > 0.1
     assert np.array_equal(share.argmax(axis=1)[clear], (height[clear] > 0.0).astype(np.int64))
@@ -150,13 +150,13 @@ def test_a_flattening_is_carried_from_a_coarse_sheet_to_a_fine_one() -> None:
     assert excess_energy(fine, uv) < 3.0 * own + 0.01
 
 
-def test_a_search_on_the_twin_comes_back_with_its_charts_and_about_its_energy() -> None:
+def test_a_search_on_the_proxy_comes_back_with_its_charts_and_about_its_energy() -> None:
     sphere = unit("sphere", 96)
-    twin = simplified(sphere, 600)
-    found = Search(twin, graph_of(twin), CONFIG)
+    proxy = simplified(sphere, 600)
+    found = Search(proxy, graph_of(proxy), CONFIG)
     for half in (True, False):
-        found.add_valid(np.flatnonzero((twin.triangles.mean(axis=1)[:, 2] > 0.0) == half))
-    back = carried_back(sphere, twin, found, 2, CONFIG)
+        found.add_valid(np.flatnonzero((proxy.triangles.mean(axis=1)[:, 2] > 0.0) == half))
+    back = carried_back(sphere, proxy, found, 2, CONFIG)
     assert len(back.pieces) == len(found.pieces) == 2
     covered = np.sort(np.concatenate([piece.ids for piece in back.pieces.values()]))
     assert np.array_equal(covered, np.arange(len(sphere.faces)))

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# small twins and one start: what is tested here holds for any
-CONFIG = FinishConfig(surrogate_faces=300, fewest_faces=200, rounds=1, start=StartConfig(counts=(0.5,)))
+# small proxies and one start: what is tested here holds for any
+CONFIG = FinishConfig(proxy_faces=300, fewest_faces=200, rounds=1, start=StartConfig(counts=(0.5,)))
 
 
 def charted(surface: Surface, charts: int = 8, config: FinishConfig = CONFIG, seed: int = 0) -> Finished:

@@ -115,7 +115,7 @@ def test_a_border_that_crosses_itself_names_the_vertices_there() -> None:
 
 
 def test_a_chart_that_touches_itself_stays_apart() -> None:
-    """A strip rolled up once around, nearly closed: laid out rigidly it would overlap where its twin is held apart."""
+    """A strip rolled up once around, nearly closed: laid out rigidly it overlaps where its source is held apart."""
     angle = np.linspace(0.0, 1.0, 200)
     across = np.linspace(0.0, 0.1, 8)
     x, y = np.meshgrid(angle, across, indexing="ij")
@@ -146,7 +146,7 @@ def test_a_large_part_is_searched_on_its_middle_mesh(monkeypatch: pytest.MonkeyP
         return plain(mesh, middle, *rest)
 
     monkeypatch.setattr(charts, "refined", looked_at)
-    config = replace(CONFIG, fine=FineConfig(faces=2000), surrogate_faces=600)
+    config = replace(CONFIG, fine=FineConfig(faces=2000), proxy_faces=600)
     found = chart_surface(surface, 4, config, 0, Stages())
     assert seen[0] < 2100 < len(surface.faces)
     label = np.zeros(len(surface.faces), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The simplified twin: small meshes stay as they are, large ones keep their shape."""
+"""The proxy: small meshes stay as they are, large ones keep their shape."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def assert_sound(surface: Surface) -> None:
     assert np.isfinite(surface.vertices).all()
 
 
-def test_a_small_surface_is_its_own_twin() -> None:
+def test_a_small_surface_is_its_own_proxy() -> None:
     sphere = sample("sphere", 12)
     assert simplified(sphere, FACES) is sphere
 
@@ -66,29 +66,29 @@ def test_a_little_too_large_is_left_alone() -> None:
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "tube", "cloth", "bracket"])
-def test_the_twin_has_about_the_faces_asked_for_and_the_same_shape(name: str) -> None:
+def test_the_proxy_has_about_the_faces_asked_for_and_the_same_shape(name: str) -> None:
     if name == "bracket":
         pytest.importorskip("manifold3d")
     surface = sample(name, 72)
-    twin = simplified(surface, FACES)
-    assert_sound(twin)
-    assert 0.9 * FACES <= len(twin.faces) <= FACES
-    assert euler_characteristic(twin.faces) == euler_characteristic(surface.faces)
-    assert is_manifold(twin.faces)
-    assert distance(surface, twin) < 0.1
-    assert twin.face_areas().sum() == pytest.approx(surface.face_areas().sum(), rel=0.03)
+    proxy = simplified(surface, FACES)
+    assert_sound(proxy)
+    assert 0.9 * FACES <= len(proxy.faces) <= FACES
+    assert euler_characteristic(proxy.faces) == euler_characteristic(surface.faces)
+    assert is_manifold(proxy.faces)
+    assert distance(surface, proxy) < 0.1
+    assert proxy.face_areas().sum() == pytest.approx(surface.face_areas().sum(), rel=0.03)
 
 
 def test_normals_stay_outwards() -> None:
-    twin = simplified(sample("sphere", 72), FACES)
-    outwards = twin.triangles.mean(axis=1)
-    assert (np.einsum("fc,fc->f", twin.face_normals(), outwards) > 0.9).all()
+    proxy = simplified(sample("sphere", 72), FACES)
+    outwards = proxy.triangles.mean(axis=1)
+    assert (np.einsum("fc,fc->f", proxy.face_normals(), outwards) > 0.9).all()
 
 
 def test_the_border_stays_where_it_is() -> None:
-    twin = simplified(sample("tube", 72), FACES)
-    table = edge_table(twin.faces)
-    assert np.abs(twin.vertices[np.unique(table.edges[table.boundary])][:, 2]) == pytest.approx(1.0, abs=0.05)
+    proxy = simplified(sample("tube", 72), FACES)
+    table = edge_table(proxy.faces)
+    assert np.abs(proxy.vertices[np.unique(table.edges[table.boundary])][:, 2]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_two_solids_that_share_a_vertex_are_simplified_apart() -> None:
@@ -100,12 +100,12 @@ def test_two_solids_that_share_a_vertex_are_simplified_apart() -> None:
     below = -np.delete(above, lowest, axis=0)  # mirrored through the shared vertex, so it turns inside out
     kiss = Surface(np.concatenate([above, below]), np.concatenate([sphere.faces, index[sphere.faces][:, ::-1]]))
     assert not is_manifold(kiss.faces)
-    twin = simplified(kiss, FACES)
-    assert_sound(twin)
-    assert len(twin.faces) <= FACES
-    assert components(twin.faces).max() == 1
-    assert is_manifold(twin.faces)
-    assert distance(kiss, twin) < 0.15
+    proxy = simplified(kiss, FACES)
+    assert_sound(proxy)
+    assert len(proxy.faces) <= FACES
+    assert components(proxy.faces).max() == 1
+    assert is_manifold(proxy.faces)
+    assert distance(kiss, proxy) < 0.15
 
 
 def test_sheets_on_one_edge_are_simplified_apart() -> None:
@@ -121,10 +121,10 @@ def test_sheets_on_one_edge_are_simplified_apart() -> None:
     vertices = np.concatenate([flat, upright[~edge], slanted[~edge]])
     book = Surface(vertices, np.concatenate([cloth.faces, index[cloth.faces], index2[cloth.faces]]))
     assert (edge_table(book.faces).edge_count == 3).sum() == 36
-    twin = simplified(book, 600)
-    assert_sound(twin)
-    assert components(twin.faces).max() == 2
-    assert distance(book, twin) < 0.1
+    proxy = simplified(book, 600)
+    assert_sound(proxy)
+    assert components(proxy.faces).max() == 2
+    assert distance(book, proxy) < 0.1
 
 
 def test_the_source_is_not_written_to() -> None:
@@ -135,49 +135,49 @@ def test_the_source_is_not_written_to() -> None:
     assert np.array_equal(sphere.faces, faces)
 
 
-def test_the_same_surface_gives_the_same_twin() -> None:
+def test_the_same_surface_gives_the_same_proxy() -> None:
     first, second = (simplified(sample("torus", 72), FACES) for _ in range(2))
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()
 
 
 @pytest.mark.parametrize("name", ["bunny", "homer"])
-def test_the_twin_of_a_real_mesh_keeps_its_shape(name: str, models: Path) -> None:
+def test_the_proxy_of_a_real_mesh_keeps_its_shape(name: str, models: Path) -> None:
     surface = load_asset(models / f"{name}.obj").surface
     surface = Surface(Frame.of(surface.vertices).apply(surface.vertices), surface.faces)
-    twin = simplified(surface, 3000)
-    assert_sound(twin)
-    assert 2700 <= len(twin.faces) <= 3000
-    assert euler_characteristic(twin.faces) == euler_characteristic(surface.faces)
-    assert distance(surface, twin) < 0.06
+    proxy = simplified(surface, 3000)
+    assert_sound(proxy)
+    assert 2700 <= len(proxy.faces) <= 3000
+    assert euler_characteristic(proxy.faces) == euler_characteristic(surface.faces)
+    assert distance(surface, proxy) < 0.06
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "cloth"])
 def test_a_thinned_surface_keeps_shape_and_topology_without_slivers(name: str) -> None:
     surface = sample(name, 128)
-    twin = thinned(surface, CONFIG)
-    assert_sound(twin)
-    assert 0.9 * FACES < len(twin.faces) < 1.1 * FACES
-    assert topology_of(twin.faces) == topology_of(surface.faces)
-    assert distance(surface, twin) < 0.1
-    assert twin.face_areas().min() > 1e-4 * twin.face_areas().mean()
+    proxy = thinned(surface, CONFIG)
+    assert_sound(proxy)
+    assert 0.9 * FACES < len(proxy.faces) < 1.1 * FACES
+    assert topology_of(proxy.faces) == topology_of(surface.faces)
+    assert distance(surface, proxy) < 0.1
+    assert proxy.face_areas().min() > 1e-4 * proxy.face_areas().mean()
 
 
 def test_a_finely_divided_plane_leaves_no_slivers() -> None:
     cloth = sample("cloth", 96)
-    twin = thinned(Surface(cloth.vertices * [1.0, 1.0, 0.0], cloth.faces), FineConfig(faces=500))
-    corner = twin.triangles
+    proxy = thinned(Surface(cloth.vertices * [1.0, 1.0, 0.0], cloth.faces), FineConfig(faces=500))
+    corner = proxy.triangles
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    assert (twin.face_areas() / longest**2).min() > 0.003
+    assert (proxy.face_areas() / longest**2).min() > 0.003
 
 
 def test_where_thinning_breaks_the_topology_the_careful_way_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = sample("torus", 48)
     broken = np.asfortranarray(surface.vertices), surface.faces[: len(surface.faces) // 2]
     monkeypatch.setattr(proxy.fast_simplification, "simplify", lambda *_, **__: broken)
-    twin = thinned(surface, CONFIG)
-    assert_sound(twin)
-    assert euler_characteristic(twin.faces) == 0
+    found = thinned(surface, CONFIG)
+    assert_sound(found)
+    assert euler_characteristic(found.faces) == 0
 
 
 def test_thinning_twice_gives_the_same_and_leaves_the_source_alone() -> None:

@@ -13,7 +13,7 @@ from flexpara.train.config import FinishConfig
 from flexpara.train.finish.openings import slit_along
 from flexpara.train.finish.slits import Flat, Slit
 from flexpara.train.search.layout import nearest_faces
-from flexpara.train.search.sides import TwinMap, faces_beside, torn_apart
+from flexpara.train.search.sides import CoarseMap, faces_beside, torn_apart
 
 CONFIG = FinishConfig()
 SLIT = Slit(np.array([[-1.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
@@ -40,32 +40,32 @@ def opened(surface: Surface) -> np.ndarray:
 
 
 def test_faces_go_on_from_their_own_side() -> None:
-    twin, fine = sheet(10), sheet(40, wiggle=0.03)
-    chosen = faces_beside(fine, Flat(twin, opened(twin), {}), CONFIG)
-    plain = nearest_faces(fine, twin, CONFIG.carry)
+    coarse, fine = sheet(10), sheet(40, wiggle=0.03)
+    chosen = faces_beside(fine, Flat(coarse, opened(coarse), {}), CONFIG)
+    plain = nearest_faces(fine, coarse, CONFIG.carry)
     side = np.sign(sheet(40).triangles.mean(axis=1)[:, 1])
-    theirs = np.sign(twin.triangles.mean(axis=1)[:, 1])
+    theirs = np.sign(coarse.triangles.mean(axis=1)[:, 1])
     left = fine.triangles.mean(axis=1)[:, 0] < -0.2
     assert (theirs[plain] != side)[left].any()  # position alone can't tell
     assert not (theirs[chosen] != side)[left].any()
 
 
 def test_without_a_slit_the_nearest_answers() -> None:
-    twin, fine = (Surface(*make_sample("cloth", resolution=n)) for n in (10, 40))
-    chosen = faces_beside(fine, Flat(twin, twin.vertices[:, :2], {}), CONFIG)
-    assert np.array_equal(chosen, nearest_faces(fine, twin, CONFIG.carry))
+    coarse, fine = (Surface(*make_sample("cloth", resolution=n)) for n in (10, 40))
+    chosen = faces_beside(fine, Flat(coarse, coarse.vertices[:, :2], {}), CONFIG)
+    assert np.array_equal(chosen, nearest_faces(fine, coarse, CONFIG.carry))
 
 
 def test_the_map_of_a_face_goes_on_beyond_it() -> None:
     surface = sheet(8)
-    mapped = TwinMap(Flat(surface, 2.0 * surface.vertices[:, :2], {}))
+    mapped = CoarseMap(Flat(surface, 2.0 * surface.vertices[:, :2], {}))
     points = np.array([[0.3, 0.2, 0.0], [5.0, 5.0, 0.0]])
     np.testing.assert_allclose(mapped(np.array([0, 1]), points), 2.0 * points[:, :2], atol=1e-9)
 
 
 def test_faces_across_an_open_slit_are_torn_apart() -> None:
     surface = sheet(10)
-    mapped = TwinMap(Flat(surface, opened(surface), {}))
+    mapped = CoarseMap(Flat(surface, opened(surface), {}))
     place = surface.triangles.mean(axis=1)
     above = int(np.linalg.norm(place - [-0.8, 0.1, 0.0], axis=1).argmin())
     below = int(np.linalg.norm(place - [-0.8, -0.1, 0.0], axis=1).argmin())
