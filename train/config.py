@@ -221,6 +221,10 @@ class FinishConfig:
     """Share of a flattening that may lie over the rest of it and goes to the charts beside it."""
     flap_edges: int = 4
     """Edges at which such faces are tried to be put on, one at a time, where they do not fit at all of them."""
+    bands: tuple[int, ...] = (2, 1)
+    """Rings of faces beside a border that may change sides to make it shorter, in one pass after the other."""
+    bands_carried: tuple[int, ...] = (1,)
+    """The same for charts that were carried back."""
     stretched: float = 0.05
     """Mean excess energy above which a piece is split, where that pays, before others are merged."""
     doubt: float = 0.003

@@ -29,14 +29,19 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
     smooth = smoothed_in_band(votes(coarse, label.reshape(-1), surface, config.carry), areas, graph, config)
     limit = max(charts, len(keys))
     piece = fragments_joined(smooth, areas, graph, config.carry.islet)
-    search = Search(surface, graph, config)
-    for number in range(int(piece.max()) + 1):
-        ids = np.flatnonzero(piece == number)
-        carry_piece(search, ids, found.pieces[int(keys[np.bincount(smooth[ids]).argmax()])], config)
-    search.place_loose()
+    search = laid_on(Search(surface, graph, config), piece, smooth, [found.pieces[int(key)] for key in keys])
     search.split_stretched()
     search.merge(-np.inf, limit)
     search.split_down()
+    return search
+
+
+def laid_on(search: Search, piece: NDArray[np.int64], label: NDArray[np.int64], sources: list[Piece]) -> Search:
+    """The search with the faces (f,) of each piece laid out like the source that most of their labels (f,) name."""
+    for number in range(int(piece.max()) + 1):
+        ids = np.flatnonzero(piece == number)
+        carry_piece(search, ids, sources[int(np.bincount(label[ids]).argmax())], search.config)
+    search.place_loose()
     return search
 
 

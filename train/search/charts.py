@@ -32,6 +32,7 @@ from .proxy import simplified, thinned
 from .search import Search
 from .slivers import steadied
 from .starts import clusters, pieces_by_score
+from .straighten import straightened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -205,6 +206,8 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     whole = exact is not None and len(middle.faces) <= config.whole_faces
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
+    if not starts.late():
+        found = straightened(found, config.bands)
     pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late)
     if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
         return exact
@@ -226,6 +229,7 @@ def brought_back(
     if coarse is not middle:
         found = carried_back(middle, coarse, found, charts, config)
     if not late():
+        found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)
         found.polish()
     pieces = list(found.pieces.values())
