@@ -235,6 +235,8 @@ class FinishConfig:
     """Merges flattened in vain before the rest, foretold worse, are believed not to pay."""
     tries: int = 150
     """Merges flattened in a search after which it looks at the most promising alone."""
+    most_tries: int = 300
+    """Merges flattened in a search after which none is made any more that raises the objective."""
     few_rounds: int = 2
     """As ``rounds``, for a part of small share."""
     most_excess: float = 0.05

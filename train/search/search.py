@@ -175,7 +175,8 @@ class Search(State):
     def merge(self, least: float, down_to: int, late: Late = never) -> None:
         """Merges that gain more than ``least``, while there are more than ``down_to`` pieces and it is not ``late``."""
         while len(self.pieces) > down_to and not late():
-            best = self.best_merge(least)
+            tired = np.isinf(least) and len(self.tried) > self.config.most_tries
+            best = None if tired else self.best_merge(least)
             if best is None or (best.gain < 0.0 and self.energy() - best.gain > self.config.most_excess):
                 return
             self.apply_merge(best, least)
