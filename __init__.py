@@ -82,14 +82,17 @@ def unwrap(
 
     options = from_keywords(Options, options, keywords)
     clock = Clock(progress, Deadline(options.time_budget))
-    source = load_any(mesh)
+    source = load_any(mesh, options.select)
     if isinstance(source, PointCloud):
         return unwrap_cloud(source, options, clock)
     return unwrap_asset(source, options, clock)
 
 
-def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
-    """A mesh as an Asset, a file without faces as a PointCloud.  Raises: InputError when it is neither."""
+def load_any(source: MeshLike | PointCloud, select: tuple[str, ...] = ()) -> Asset | PointCloud:
+    """A mesh as an Asset, a file without faces as a PointCloud.  select: as for `load`.
+
+    Raises: InputError when it is neither.
+    """
     from .runtime.io.meshfile import load
     from .runtime.io.points.cloud import PointCloud
     from .runtime.io.points.cloudfile import is_cloud, load_cloud
@@ -98,7 +101,7 @@ def load_any(source: MeshLike | PointCloud) -> Asset | PointCloud:
         return source
     if isinstance(source, str | Path) and is_cloud(Path(source)):
         return load_cloud(Path(source))
-    return load(source)
+    return load(source, select)
 
 
 def unwrap_asset(

@@ -151,7 +151,7 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     chosen_maps(run.outputs)
     deadline = Deadline(run.options.time_budget)
     with console.progress() as progress:
-        source = load_any(run.mesh)
+        source = load_any(run.mesh, run.options.select)
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
             if isinstance(source, Asset):
                 outputs = run.outputs.for_asset(source)
@@ -194,7 +194,7 @@ def train(
     """
     from .runtime.files import OutputFolder
 
-    asset = load(mesh)
+    asset = load(mesh, options.select)
     console.note_changes(asset)
     name, report = f"{asset.stem}.{TRAINED}", f"{asset.stem}.train.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
@@ -239,7 +239,7 @@ def export(
     from .runtime.files import OutputFolder
     from .runtime.io.changes import lost
 
-    asset = load(mesh)
+    asset = load(mesh, options.select)
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
         outputs = outputs.for_asset(asset)
         console.note_changes(asset, lost(asset, outputs))

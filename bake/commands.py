@@ -108,7 +108,7 @@ def bake(
     from ..runtime.files import OutputFolder
     from ..runtime.io.meshfile import load
 
-    asset = load(mesh)
+    asset = load(mesh, options.select)
     console.note_changes(asset)
     job = _job(_layout(asset, options, console), asset, options, high)
     if not job.maps:

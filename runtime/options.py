@@ -61,6 +61,14 @@ class Seeded:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SourceOptions:
+    """What is read of a file."""
+
+    select: Names = ()
+    """Nodes and meshes of a glTF scene to work on, by name; all else comes back as it is.  By default all of it."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class PaperOptions:
     """What preset "paper" alone can be asked."""
 
@@ -90,7 +98,7 @@ class PaperOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChartOptions:
+class ChartOptions(SourceOptions):
     """What is asked of the charts, and how they are found."""
 
     charts: int = 8
@@ -122,7 +130,7 @@ class TrainOptions(Seeded, PaperOptions, ChartOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AtlasOptions:
+class AtlasOptions(SourceOptions):
     """The atlas as an image."""
 
     size: int = 2048

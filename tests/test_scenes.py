@@ -114,3 +114,21 @@ def test_any_uv_set_can_be_baked_onto(scene: Path, tmp_path: Path, capsys: pytes
     assert "overlap" in capsys.readouterr().err
     assert main([*argv, "--uv-set", "1"]) == 2
     assert "Board of scene has no uv set 1" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_what_is_not_selected_comes_back_as_it_was(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--size", "64", "--no-preview", "--quiet", "--select"]
+    assert main([*argv, "Root"]) == 0
+    before, after = (tree_of(path) for path in (scene, tmp_path / "out" / "scene.glb"))
+    sets = [list(mesh["primitives"][0]["attributes"]) for mesh in after["meshes"]]
+    assert "TEXCOORD_1" in sets[0]
+    assert sorted(sets[1]) == sorted(before["meshes"][1]["primitives"][0]["attributes"])
+    arm, board = (after["meshes"][mesh]["primitives"][0]["material"] for mesh in (1, 0))
+    assert after["materials"][arm] == before["materials"][0]
+    assert after["materials"][board]["name"] == "Paint"
+    assert board != arm
+    assert main([*argv, "Leg"]) == 2
+    assert "no node and no mesh is called 'Leg'" in capsys.readouterr().err

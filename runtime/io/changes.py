@@ -38,6 +38,7 @@ WORDS = {
     "skipped_cameras": "{} left out|camera|cameras",
     "skipped_lights": "{} left out|light|lights",
     "skipped_lines": "{} left out|line element|line elements",
+    "skipped_meshes": "{} not selected or without triangles left out|mesh|meshes",
     "skipped_morph_targets": "{} left out|morph target|morph targets",
     "skipped_names": "{} of objects, groups or smoothing left out|name|names",
     "skipped_pictures": "{} of materials left out, as they lie on the old uv|picture|pictures",

@@ -28,7 +28,7 @@ from .rawmesh import RawMesh, unit_vectors
 from .stl import read_stl
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import trimesh
     from numpy.typing import ArrayLike, NDArray
@@ -38,12 +38,13 @@ if TYPE_CHECKING:
 MAX_BYTES = 8 << 30
 
 
-def load_asset(path: Path, *, instances: bool = False) -> Asset:
+def load_asset(path: Path, *, instances: bool = False, select: Sequence[str] = ()) -> Asset:
     """Read and clean a mesh file.
 
     Args:
         path: obj, ply, stl, glb, gltf, off, or another format that trimesh reads.
         instances: each mesh of a scene wherever it stands; otherwise once, with the scene as its document.
+        select: names of nodes and meshes of a glTF scene, beyond which nothing is read; () is everything.
 
     Returns:
         The Asset; its changes say what cleaning did and what could not be kept.
@@ -65,16 +66,22 @@ def load_asset(path: Path, *, instances: bool = False) -> Asset:
             "for all else give a triangle mesh"
         )
     data = path.read_bytes()
+    if select and path.suffix.lower() not in (".glb", ".gltf"):
+        raise MeshError(f"{path} with select, expected a glTF scene, whose parts have names; leave --select out")
+    gltf = partial(read_gltf, data, path.parent, instances=instances, select=select)
     try:
-        return clean(_read(data, path, instances=instances), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
+        return clean(_read(data, path, gltf), stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
     except InputError as error:
         raise MeshError(f"{path}: {error}") from error
 
 
-def load(mesh: MeshLike) -> Asset:
-    """The mesh as an Asset, cleaned.  Raises: InputError when it is no mesh, or one with nothing to unwrap."""
+def load(mesh: MeshLike, select: Sequence[str] = ()) -> Asset:
+    """The mesh as an Asset, cleaned.  select: names of nodes and meshes of a glTF scene; () is everything.
+
+    Raises: InputError when it is no mesh, or one with nothing to unwrap.
+    """
     if isinstance(mesh, str | Path):
-        return load_asset(Path(mesh))
+        return load_asset(Path(mesh), select=select)
     if isinstance(mesh, tuple):
         return asset_from_arrays(*mesh)
     visual: Any = mesh.visual
@@ -132,15 +139,15 @@ def _array(name: str, values: ArrayLike, columns: tuple[int, ...], kinds: str, r
     return array
 
 
-def _read(data: bytes, path: Path, *, instances: bool) -> RawMesh:
+def _read(data: bytes, path: Path, gltf: Callable[[], RawMesh]) -> RawMesh:
     kind, folder = path.suffix.lower().removeprefix("."), path.parent
     readers: dict[str, Callable[[], RawMesh]] = {
         "obj": lambda: read_obj(data, partial(read_in_folder, folder)),
         "ply": lambda: read_ply(data, partial(read_in_folder, folder)),
         "stl": lambda: read_stl(data),
         "off": lambda: read_off(data),
-        "glb": lambda: read_gltf(data, folder, instances=instances),
-        "gltf": lambda: read_gltf(data, folder, instances=instances),
+        "glb": gltf,
+        "gltf": gltf,
     }
     if kind in readers:
         return readers[kind]()

@@ -50,6 +50,7 @@ class Document:
         tree: dict[str, Any] = self.file.tree
         primitives = [primitive for mesh in tree.get("meshes", []) for primitive in mesh["primitives"]]
         counts = {
+            "skipped_meshes": len(tree.get("meshes", [])) - len({part.mesh for part in self.parts}),
             "skipped_animations": len(tree.get("animations", [])),
             "skipped_skins": len(tree.get("skins", [])),
             "skipped_morph_targets": sum(len(primitive.get("targets", [])) for primitive in primitives),

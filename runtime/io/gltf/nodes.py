@@ -75,6 +75,32 @@ def best_placements(placements: Sequence[Placement]) -> list[Placement]:
     return list(found.values())
 
 
+def select_placements(tree: dict[str, Any], placements: Sequence[Placement], names: Sequence[str]) -> list[Placement]:
+    """Those of meshes that are named, or that stand at a node named or below one; all without names.
+
+    Raises: MeshError for a name that is none of the scene's.
+    """
+    if not names:
+        return list(placements)
+    nodes, meshes = tree.get("nodes", []), tree.get("meshes", [])
+    known = [str(entry["name"]) for entry in (*nodes, *meshes) if "name" in entry]
+    for name in names:
+        if name not in known:
+            there = ", ".join(dict.fromkeys(known)) or "no names"
+            raise MeshError(f"no node and no mesh is called {name!r}, expected some of {there[:200]}; correct --select")
+    below = [index for index, node in enumerate(nodes) if node.get("name") in names]
+    inside: set[int] = set()
+    while below:
+        index = below.pop()
+        inside.add(index)
+        below += [child for child in nodes[index].get("children", []) if child not in inside]
+    chosen = {index for index, mesh in enumerate(meshes) if mesh.get("name") in names}
+    chosen |= {entry.mesh for entry in placements if entry.node in inside}
+    if not chosen:
+        raise MeshError(f"{', '.join(names)} holds no mesh, expected one or more; correct --select")
+    return [entry for entry in placements if entry.mesh in chosen]
+
+
 def _scenes(tree: dict[str, Any]) -> list[list[int]]:
     """Root nodes of each scene, the default one first; without scenes all nodes that are nobody's child."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])

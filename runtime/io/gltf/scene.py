@@ -21,7 +21,7 @@ from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor
 from .compression import DRACO, decode_draco
 from .document import Document, Part
 from .materials import read_materials, uv_set
-from .nodes import best_placements, placed_meshes
+from .nodes import best_placements, placed_meshes, select_placements
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,13 +34,14 @@ if TYPE_CHECKING:
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_gltf(data: bytes, folder: Path, *, instances: bool = False) -> RawMesh:
+def read_gltf(data: bytes, folder: Path, *, instances: bool = False, select: Sequence[str] = ()) -> RawMesh:
     """Read a .glb or .gltf file: each mesh once, where it stands best for unwrapping, with the document beside it.
 
     Args:
         data: the bytes of the file.
         folder: where it lies; references outside of it, and URLs, are refused.
         instances: each mesh wherever it stands in the default scene instead, as triangles without a document.
+        select: names of meshes and nodes, beyond which nothing is read; () is everything.
 
     Raises:
         MeshError: damaged, of an extension that must be known and is not, without triangles, or with such a reference.
@@ -49,7 +50,7 @@ def read_gltf(data: bytes, folder: Path, *, instances: bool = False) -> RawMesh:
     try:
         tree, binary = parse_tree(data)
         file = GltfFile(tree, read_buffers(tree, binary, folder), folder)
-        return _scene(file, instances=instances)
+        return _scene(file, select, instances=instances)
     except FlexparaError:
         raise
     except (
@@ -76,9 +77,9 @@ def _what(error: Exception) -> str:
     return "a value has the wrong type or size"
 
 
-def _scene(file: GltfFile, *, instances: bool) -> RawMesh:
+def _scene(file: GltfFile, select: Sequence[str], *, instances: bool) -> RawMesh:
     materials, changes = read_materials(file)
-    placements = placed_meshes(file)
+    placements = select_placements(file.tree, placed_meshes(file), select)
     chosen = [entry for entry in placements if entry.first] if instances else best_placements(placements)
     found, parts, skipped, faces = [], [], 0, 0
     for placement in chosen:
