@@ -13,13 +13,13 @@ class SampleConfig:
     """Samples for each face of the surface, evenly by area …"""
     least: int = 20_000
     """… but at least this many …"""
-    even: int = 100_000
+    even: int = 150_000
     """… and at most this many in all."""
     fewest: int = 32
     """Samples that each chart gets at least, however small it is."""
     along: int = 4000
     """Samples beside seams for each unit of their length …"""
-    beside: int = 80_000
+    beside: int = 120_000
     """… but at most this many in all."""
     reach: float = 0.02
     """Greatest distance of these from their seam."""
