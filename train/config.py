@@ -145,6 +145,12 @@ class FineConfig:
     """Near faces of the middle mesh that are looked at beside a slit."""
     torn: float = 1.5
     """How much farther apart in uv than in space two of them are where a slit runs between them."""
+    rings: int = 3
+    """Rings of faces around a flipped one that turn as those beside them."""
+    trims: int = 3
+    """Times faces that stay folded are cut off a chart …"""
+    most_wrong: float = 1e-3
+    """… as long as they are no more than this share of its faces."""
     contacts: int = 2
     """Steps more, in which what came to overlap is held where it was …"""
     hold: float = 1e3

@@ -53,7 +53,7 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     end = np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
     span = int(start.max(initial=0)) + 1
     key = np.minimum(start, end) * span + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
+    order = stable_order(key, span * span)
     is_first = np.ones(len(key), dtype=bool)
     is_first[1:] = key[order][1:] != key[order][:-1]
     first = np.flatnonzero(is_first)
@@ -73,6 +73,19 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
         edge_count=count,
         manifold=(count == 2) & opposite,
     )
+
+
+def stable_order(key: NDArray[np.int64], bound: int) -> NDArray[np.int64]:
+    """``np.argsort(key, kind="stable")`` of keys in [0, bound): each sorted with its place as one number, if that fits.
+
+    Numbers sort several times as fast as places.
+    """
+    bits = max(len(key) - 1, 1).bit_length()
+    if (bound << bits) > np.iinfo(np.int64).max:
+        return np.argsort(key, kind="stable")
+    packed = (key << bits) | np.arange(len(key))
+    packed.sort()
+    return packed & ((1 << bits) - 1)
 
 
 def face_components(n_faces: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -137,17 +150,32 @@ def split_non_manifold_vertices(
     """
     table = table or edge_table(faces)
     joined = table.manifold if cut_edges_mask is None else table.manifold & ~cut_edges_mask
-    here, there = table.edge_halfedges[joined].T
-    ends = np.concatenate([np.stack([here, next_halfedge(there)]), np.stack([next_halfedge(here), there])], axis=1)
-    n_corners = 3 * len(faces)
-    link = coo_matrix((np.ones(ends.shape[1], dtype=np.int8), (ends[0], ends[1])), shape=(n_corners, n_corners))
-    n_fans, fan = connected_components(link, directed=False)
-    old_vertex = np.zeros(n_fans, dtype=np.int64)
-    old_vertex[fan] = faces.reshape(-1)
-    order = np.argsort(old_vertex, kind="stable")
-    rank = np.zeros(n_fans, dtype=np.int64)
-    rank[order] = np.arange(n_fans)
-    return rank[fan].reshape(-1, 3), old_vertex[order]
+    fan = fans(faces, table.edge_halfedges[joined])
+    first = np.flatnonzero(fan == np.arange(len(fan)))
+    order = first[np.argsort(faces.reshape(-1)[first], kind="stable")]
+    rank = np.zeros(len(fan), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank[fan].reshape(-1, 3), faces.reshape(-1)[order].astype(np.int64)
+
+
+def fans(faces: NDArray[np.int64], joined: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(3f,) the lowest corner of each corner's fan; joined (e, 2): half-edges along which faces hang together.
+
+    Each corner points at the next one around its vertex, or at itself where the fan ends.  Pointers are doubled until
+    they have gone all the way round, or to the end, with the lowest corner seen.
+    """
+    corner = np.arange(faces.size)
+    after = corner.copy()
+    after[next_halfedge(joined[:, 0])] = joined[:, 1]
+    after[next_halfedge(joined[:, 1])] = joined[:, 0]
+    lowest, jump = corner, after
+    for _ in range(int(np.bincount(faces.reshape(-1)).max(initial=1)).bit_length()):
+        lowest, jump = np.minimum(lowest, lowest[jump]), jump[jump]
+    open_fan = np.flatnonzero(after[jump] == jump)
+    whole = corner.copy()
+    np.minimum.at(whole, jump[open_fan], open_fan)
+    lowest[open_fan] = whole[jump[open_fan]]
+    return lowest
 
 
 def next_halfedge(half: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,7 +1,8 @@
 """From a middle mesh, thinned but searched and finished, to the fine surface itself.   f faces · v vertices · area 1.
 
-A fine chart differs from its chart on the middle mesh in detail only.  It takes that one's rotations, and rigid steps
-by conjugate gradients lay it out, that one being the coarse level: no factorization or SLIM sees the fine surface.
+A fine chart differs from its source, the chart on the middle mesh, in detail only.  It takes the source's rotations,
+and rigid steps by conjugate gradients lay it out, the source being the coarse level: no factorization or SLIM sees the
+fine surface.
 """
 
 from __future__ import annotations
@@ -14,14 +15,16 @@ import numpy as np
 from scipy import sparse
 
 from ...runtime.geometry.distortion import singular_values
-from ...runtime.geometry.overlap import overlapping_pairs
-from ...runtime.geometry.topology import boundary_loops, edge_table
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.topology import boundary_loops, components, edge_table
 from ...runtime.mesh import Surface
 from ..finish.arap import RigidSteps, evened_out, nearest_rotations
 from ..finish.contact import boundary_edges, rim_faces
+from ..finish.fallback import unwrapped_by_xatlas
+from ..finish.flaps import restricted
 from ..finish.flatten import Pins, jacobians
 from ..finish.openings import openings, slit_along
-from ..finish.pieces import Piece, extract, measured
+from ..finish.pieces import Piece, extract, measured, try_piece
 from ..finish.slits import Flat
 from ..finish.twolevel import TwoLevel
 from ..workers import parallel_map
@@ -41,7 +44,7 @@ if TYPE_CHECKING:
 
 
 def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig) -> list[Piece]:
-    """The charts of the middle mesh on the surface; one that can't be laid out as there is flattened anew."""
+    """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew."""
     label = np.zeros(len(middle.faces), dtype=np.int64)
     for number, piece in enumerate(pieces):
         label[piece.ids] = number
@@ -55,35 +58,98 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
     total = float(areas.sum())
     found = parallel_map(lambda number: refined_piece(surface, groups[number], sources[number], total, config), order)
     search = None
-    for number, piece in zip(order, found, strict=True):
-        if piece is not None:
+    for number, pieces_of in zip(order, found, strict=True):
+        if pieces_of:
             continue
         search = search or Search(surface, graph, config)
         search.add_valid(groups[number], sources[number].slits)
     if search is not None:
         search.place_loose()
-    return [piece for piece in found if piece is not None] + ([] if search is None else list(search.pieces.values()))
+    return [piece for of_one in found for piece in of_one] + ([] if search is None else list(search.pieces.values()))
 
 
 def refined_piece(
     surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig
-) -> Piece | None:
-    """The faces ids (m,) laid out as on the middle mesh, of lowest cost; None where no way to open them is valid so."""
+) -> list[Piece]:
+    """The faces ids (m,) laid out like their source, and what had to be cut off; empty where no way to is valid."""
     whole = extract(surface, ids)
-    best: Piece | None = None
+    best: list[Piece] = []
     for disk in opened_alike(whole, source, config):
-        uv = laid_out(disk, source.flat, config)
-        if uv is None:
-            continue
-        piece = replace(measured(surface, ids, Flat(disk, uv, {}), total, source.slits), resort=source.resort)
-        if best is None or piece.cost(config.slit.price) < best.cost(config.slit.price):
-            best = piece
+        uv, wrong = laid_out(disk, source.flat, config)
+        found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config)
+        if found and (not best or total_cost(found, config) < total_cost(best, config)):
+            best = found
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
-    return best if best is not None and best.energy <= allowed else None
+    if not best or best[0].energy > allowed:
+        return []
+    return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]
+
+
+def total_cost(pieces: list[Piece], config: FinishConfig) -> float:
+    """What pieces add to the objective, their borders left out."""
+    return sum(piece.cost(config.slit.price) for piece in pieces)
+
+
+def without_folds(
+    surface: Surface,
+    ids: NDArray[np.int64],
+    flat: Flat,
+    wrong: NDArray[np.bool_],
+    total: float,
+    config: FinishConfig,
+) -> list[Piece]:
+    """The piece, first, and the wrong (m,) faces that were cut off it, a little around them included, as others."""
+    rows, rest = np.arange(len(ids)), flat
+    for _ in range(config.fine.trims if wrong.any() else 0):
+        if wrong.mean() > config.fine.most_wrong:
+            return []
+        keep = ~grown(flat.surface.faces, wrong, len(flat.uv), 1)
+        part = components(flat.surface.faces[keep])
+        rows = np.flatnonzero(keep)[part == np.bincount(part).argmax()]
+        rest = restricted(flat, rows)
+        found = wrong_faces(rest)
+        wrong = ~np.isin(np.arange(len(ids)), rows)
+        wrong[rows[found]] = True
+        if not found.any():
+            break
+    if wrong_faces(rest).any():
+        return []
+    off = np.setdiff1d(np.arange(len(ids)), rows)
+    return [measured(surface, ids[rows], rest, total, ()), *flaps_apart(surface, ids[off], total, config)]
+
+
+def flaps_apart(surface: Surface, ids: NDArray[np.int64], total: float, config: FinishConfig) -> list[Piece]:
+    """Each connected group of a few faces ids (m,), as a piece of its own."""
+    if len(ids) == 0:
+        return []
+    group, pieces = components(surface.faces[ids]), []
+    for number in range(int(group.max()) + 1):
+        flap = ids[group == number]
+        laid = try_piece(surface, flap, total, config)
+        pieces += [laid] if isinstance(laid, Piece) else unwrapped_by_xatlas(surface, flap, total)
+    return pieces
+
+
+def grown(faces: NDArray[np.int64], chosen: NDArray[np.bool_], count: int, rings: int) -> NDArray[np.bool_]:
+    """(f,) bool: chosen (f,) faces and those within so many rings of them; count of vertices."""
+    for _ in range(rings):
+        touched = np.zeros(count, dtype=bool)
+        touched[faces[chosen]] = True
+        chosen = np.asarray(touched[faces].any(axis=1))
+    return chosen
+
+
+def wrong_faces(flat: Flat) -> NDArray[np.bool_]:
+    """(f,) bool: flipped, or along a border that crosses itself there."""
+    faces = flat.surface.faces
+    wrong = flipped_triangles(flat.uv[faces])
+    rim = rim_faces(faces, boundary_edges(faces))
+    wrong[rim[overlapping_pairs(flat.uv[faces[rim]]).reshape(-1)]] = True
+    return wrong
 
 
 def opened_alike(whole: Surface, source: Piece, config: FinishConfig) -> Iterator[Surface]:
-    """The ways to open a piece that leave as many borders as there are on the middle mesh; all where none does."""
+    """The ways to open a piece that leave as many borders as its source has; all ways where none does."""
     slit = slit_along(whole, source.slits, config.slit)
     ways = [opening.disk for opening in openings(slit, config.slit.seams)]
     loops = len(boundary_loops(source.flat.surface.faces))
@@ -91,31 +157,63 @@ def opened_alike(whole: Surface, source: Piece, config: FinishConfig) -> Iterato
     yield from alike or ways
 
 
-def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.float64] | None:
-    """Uv (v, 2) of an opened piece, as on the middle mesh, without flips and overlap; None where that can't be had.
+def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Uv (v, 2) of an opened piece, like its source's, and the faces (f,) bool that are flipped or overlap there.
 
-    First with the middle mesh's stretch, contacts and all, then as rigid as it may become without overlap.
+    First with the source's stretch, contacts and all, then as rigid as it may become without overlap.
     """
     fine = config.fine
     nearest = faces_beside(disk, source, config)
     coarse = weights_of(disk, source.surface, nearest)
     solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
     rigid = RigidSteps(disk, solver)
-    valid = None
     uv = rigid.solve(bounded(carried_jacobians(disk, source, nearest), fine.steepest), coarse @ source.uv)
+    best, fewest = uv, np.ones(len(disk.faces), dtype=bool)
     touching = np.zeros(len(uv), dtype=bool)
     for _ in range(fine.steps + fine.contacts):
         flat = evened_out(disk.faces, uv, config.slit.contact.unfolding)
-        found = overlapping_vertices(disk.faces, uv if flat is None else flat)
-        if flat is not None and not found.any():
-            valid = flat
-        elif valid is not None:
-            touching |= found
+        found = wrong_faces(Flat(disk, uv if flat is None else flat, {}))
+        if found.sum() <= fewest.sum():
+            best, fewest = uv if flat is None else flat, found
+        elif not fewest.any():
+            touching[disk.faces[found]] = True
             held = np.flatnonzero(touching)
-            rigid = RigidSteps(disk, solver, Pins(held, valid[held], fine.hold))
-            uv = valid
-        uv = rigid.solve(nearest_rotations(jacobians(disk, uv)), uv)
-    return valid
+            rigid = RigidSteps(disk, solver, Pins(held, best[held], fine.hold))
+            uv = best
+        uv = rigid.solve(rotations(disk, uv, fine.rings), uv)
+    return best, fewest
+
+
+def rotations(disk: Surface, uv: NDArray[np.float64], rings: int) -> NDArray[np.float64]:
+    """(f, 2, 2) nearest rotations at uv (v, 2); faces within ``rings`` of a flipped one turn as the others beside them.
+
+    A fold at the border is stable: every face of it is as rigid as can be.
+    """
+    turn = nearest_rotations(jacobians(disk, uv))
+    wrong = grown(disk.faces, flipped_triangles(uv[disk.faces]), len(uv), rings)
+    if wrong.all() or not wrong.any():
+        return turn
+    beside = spread(disk, wrong)
+    fold = np.flatnonzero(beside != np.arange(len(beside)))
+    part = Surface(disk.vertices, disk.faces[fold])
+    turn[fold] = nearest_rotations(carried_jacobians(part, Flat(disk, uv, {}), beside[fold]))
+    return turn
+
+
+def spread(disk: Surface, wrong: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(f,) the face itself, or for wrong (f,) ones the nearest other across edges; themselves where there is none."""
+    beside, left = np.arange(len(wrong)), wrong.copy()
+    table = edge_table(disk.faces)
+    pairs = table.edge_faces[table.manifold]
+    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    pairs = pairs[wrong[pairs[:, 1]]]
+    while True:
+        onto = pairs[~left[pairs[:, 0]] & left[pairs[:, 1]]]
+        if len(onto) == 0:
+            return beside
+        face, first = np.unique(onto[:, 1], return_index=True)
+        beside[face] = beside[onto[first, 0]]
+        left[face] = False
 
 
 def bounded(jacobian: NDArray[np.float64], steepest: float) -> NDArray[np.float64]:
@@ -125,21 +223,13 @@ def bounded(jacobian: NDArray[np.float64], steepest: float) -> NDArray[np.float6
     return np.where(wild[:, None, None], nearest_rotations(jacobian), jacobian)
 
 
-def overlapping_vertices(faces: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(v,) bool: a face at the vertex, along the border, lies over another; none where no border crosses itself."""
-    rim = rim_faces(faces, boundary_edges(faces))
-    found = np.zeros(len(uv), dtype=bool)
-    found[faces[rim[overlapping_pairs(uv[faces[rim]])]]] = True
-    return found
-
-
 def solver_with(coarse: sparse.csr_array, tolerance: float, most: int, matrix: sparse.csr_array) -> Solve:
     """Solves by conjugate gradients with a coarse level (v, w)."""
     return TwoLevel(matrix, coarse, tolerance, most).solve
 
 
 def weights_of(disk: Surface, source: Surface, nearest: NDArray[np.int64]) -> sparse.csr_array:
-    """(v, w) weights of coarse vertices at those of a piece: barycentric in the nearest (f,) of a face around it.
+    """(v, w) weights of the source's vertices at those of a piece: barycentric in the nearest (f,) of a face around it.
 
     Clipped to the triangle: no weight is negative, and they add up to 1.
     """

@@ -16,10 +16,13 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FineConfig, FinishConfig
+from flexpara.train.finish.arap import nearest_rotations
+from flexpara.train.finish.flatten import jacobians
 from flexpara.train.finish.pieces import Piece, make_piece
+from flexpara.train.finish.slits import Flat
 from flexpara.train.search import charts, fine
 from flexpara.train.search.charts import chart_surface, objective
-from flexpara.train.search.fine import bounded, laid_out, overlapping_vertices, refined, weights_of
+from flexpara.train.search.fine import bounded, laid_out, refined, rotations, weights_of, without_folds, wrong_faces
 from flexpara.train.search.layout import nearest_faces
 from flexpara.train.search.proxy import thinned
 
@@ -79,7 +82,11 @@ def test_a_hole_and_a_slit_come_back() -> None:
 def test_what_can_not_be_laid_out_is_flattened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = unit("sphere", 64)
     middle = thinned(surface, MIDDLE)
-    monkeypatch.setattr(fine, "laid_out", lambda *_: None)
+
+    def all_wrong(disk: Surface, *_: object) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((len(disk.vertices), 2)), np.ones(len(disk.faces), dtype=bool)
+
+    monkeypatch.setattr(fine, "laid_out", all_wrong)
     found = refined(surface, middle, halves(middle), CONFIG)
     assert len(found) >= 2
     for piece in found:
@@ -102,16 +109,40 @@ def test_the_stretch_of_a_sliver_is_not_taken_over() -> None:
     np.testing.assert_allclose(bounded(jacobian, 2.0), [np.diag([1.5, 0.9]), np.eye(2), np.eye(2)])
 
 
-def test_a_border_that_crosses_itself_names_the_vertices_there() -> None:
+def test_a_border_that_crosses_itself_and_flips_are_named() -> None:
     surface = unit("cloth", 12)
     uv = surface.vertices[:, :2].copy()
-    assert not overlapping_vertices(surface.faces, uv).any()
-    turn = 1.3 * np.pi * uv / np.ptp(uv[:, 0])
-    rolled = np.stack([(1.0 + turn[:, 1]) * np.cos(turn[:, 0]), (1.0 + turn[:, 1]) * np.sin(turn[:, 0])], axis=1)
-    rolled[:, 0] += 3.0 * (turn[:, 0] > 1.5 * np.pi)
-    found = overlapping_vertices(surface.faces, rolled)
+    assert not wrong_faces(Flat(surface, uv, {})).any()
+    turn = 2.4 * np.pi * uv / np.ptp(uv[:, 0])
+    rolled = np.stack([(4.0 + turn[:, 1]) * np.cos(turn[:, 0]), (4.0 + turn[:, 1]) * np.sin(turn[:, 0])], axis=1)
+    found = wrong_faces(Flat(surface, rolled, {}))
     assert found.any()
-    assert not found.all()
+    mirrored = wrong_faces(Flat(surface, uv * [-1.0, 1.0], {}))
+    assert mirrored.all()
+
+
+def test_a_fold_that_stays_is_cut_off_as_a_chart_of_its_own() -> None:
+    surface = unit("cloth", 60)
+    flat = Flat(surface, surface.vertices[:, :2].copy(), {})
+    flat = flat if not wrong_faces(flat).all() else Flat(surface, surface.vertices[:, 1::-1].copy(), {})
+    corner = int((surface.vertices @ [1.0, 1.0, 0.0]).argmax())
+    flat.uv[corner] -= 0.2
+    wrong = wrong_faces(flat)
+    assert wrong.any()
+    found = without_folds(surface, np.arange(len(surface.faces)), flat, wrong, 1.0, CONFIG)
+    assert len(found) == 2
+    assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(surface.faces)))
+    for piece in found:
+        assert_valid(piece)
+
+
+def test_faces_around_a_flip_turn_as_those_beside_them() -> None:
+    surface = unit("cloth", 30)
+    flat = Surface(surface.vertices * [1.0, 1.0, 0.0], surface.faces)
+    uv = flat.vertices[:, :2].copy()
+    plain = nearest_rotations(jacobians(flat, uv))
+    uv[int((flat.vertices @ [1.0, 1.0, 0.0]).argmax())] -= 0.3
+    np.testing.assert_allclose(rotations(flat, uv, 3), plain, atol=1e-6)
 
 
 def test_a_chart_that_touches_itself_stays_apart() -> None:
@@ -130,10 +161,9 @@ def test_a_chart_that_touches_itself_stays_apart() -> None:
     if flipped_triangles(closed[faces]).all():
         faces = faces[:, [0, 2, 1]]
         surface = Surface(points, faces)
-    found = laid_out(surface, fine.Flat(surface, closed, {}), CONFIG)
-    assert found is not None
-    assert not flipped_triangles(found[faces]).any()
-    assert not overlapping_vertices(faces, found).any()
+    found, wrong = laid_out(surface, Flat(surface, closed, {}), CONFIG)
+    assert not wrong.any()
+    assert not wrong_faces(Flat(surface, found, {})).any()
 
 
 def test_a_large_part_is_searched_on_its_middle_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
