@@ -22,6 +22,7 @@ from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
+from ..train.polygons import whole_polygons
 from ..train.search.recut import recut
 from .metadata import PlacedCharts, Provenance
 from .onnxfile import export_networks
@@ -89,12 +90,25 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
 
 
+def _with_whole_polygons(asset: Asset, trained: Trained, clock: Clock) -> Trained:
+    """Seams off the diagonals of polygons, where there is room, and the networks of these charts."""
+    if asset.polygons is None or trained.paper is not None:
+        return trained
+    charts = whole_polygons(asset.surface, trained.charts, asset.polygons)
+    if charts is trained.charts:
+        return trained
+    ball = Surface(trained.frame.apply(asset.surface.vertices), asset.surface.faces)
+    networks = fit_networks(ball, charts, fit_in_force(trained.settings), trained.settings["seed"], clock)
+    return replace(trained, charts=charts, networks=networks)
+
+
 def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, square: Square) -> tuple[Trained, Packed]:
     """Packed charts that are valid as written; those that float32 could not hold are cut again, and all fitted anew.
 
     Raises: FinishError where charts stay invalid (a defect).
     """
     seed, config = trained.settings["seed"], PackConfig()
+    trained = _with_whole_polygons(asset, trained, clock)
     packed = pack_square(asset, trained.charts, square, seed, config)
     for _ in range(config.recuts):
         if len(packed.invalid) == 0:
