@@ -72,7 +72,7 @@ def unwrap(
 
     Raises:
         InputError: the mesh or an option is wrong.
-        MissingDependencyError: the packages of flexpara[train] are absent.
+        MissingDependencyError: the packages of flexpara[unwrap] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
     from .runtime.deadline import Deadline
@@ -111,7 +111,7 @@ def unwrap_asset(
     from .runtime.extras import requires
     from .runtime.progress import Clock
 
-    with requires("train"):
+    with requires("unwrap"):
         from .export.assemble import assemble
         from .runtime.pack.density import square_of
         from .train.presets import train_asset
@@ -131,7 +131,7 @@ def unwrap_cloud(
     from .runtime.extras import requires
     from .runtime.progress import Clock
 
-    with requires("train"):
+    with requires("unwrap"):
         from .export.assemble import assemble
         from .runtime.pack.density import square_of
         from .train.presets import train_cloud

@@ -199,7 +199,7 @@ def train(
     name, report = f"{asset.stem}.{TRAINED}", f"{asset.stem}.train.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         folder.check([name, folder.report_name])
-        with requires("train"):
+        with requires("unwrap"):
             from .train.presets import train_asset
             from .train.saved import to_bytes
         with console.progress() as progress:
@@ -244,7 +244,7 @@ def export(
         outputs = outputs.for_asset(asset)
         console.note_changes(asset, lost(asset, outputs))
         check_outputs(folder, outputs, chosen_maps(outputs))
-        with requires("train"):
+        with requires("unwrap"):
             from .export.assemble import assemble
             from .runtime.pack.density import square_of
             from .train.saved import read_trained

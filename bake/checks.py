@@ -88,6 +88,8 @@ def check_outputs(
     with requires("bake"):
         for module in (name for name, needed in wanted.items() if needed):
             import_module(f".{module}", __package__)
+        if maps or outputs.preview:
+            import_module("OpenImageIO")
 
 
 def check_green(outputs: Outputs) -> None:

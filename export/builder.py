@@ -15,7 +15,7 @@ from ..runtime.errors import FlexparaError, MissingDependencyError
 try:
     from onnx import NodeProto, TensorProto, ValueInfoProto, checker, helper, numpy_helper, shape_inference
 except ImportError as error:
-    raise MissingDependencyError('onnx is missing, export needs it; pip install "flexpara[train]"') from error
+    raise MissingDependencyError('onnx is missing, export needs it; pip install "flexpara[unwrap]"') from error
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

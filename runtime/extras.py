@@ -20,7 +20,7 @@ def requires(extra: str) -> Iterator[None]:
 
     Raises: MissingDependencyError; FlexparaError where torch is asked for and would hang, see `forks`.
     """
-    if extra == "train":
+    if extra in ("train", "unwrap"):
         refuse_fork_of_torch()
     try:
         yield

@@ -293,7 +293,7 @@ def test_preset_fast_needs_no_torch(square: Path) -> None:
     ("absent", "argv", "extra"),
     [
         ("torch", ["unwrap", "square.obj", "-o", "out", "--preset", "paper"], "flexpara[train]"),
-        ("igl", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[train]"),
+        ("igl", ["unwrap", "square.obj", "-o", "out", "--maps", "none", "--no-preview"], "flexpara[unwrap]"),
         ("moderngl", ["unwrap", "square.obj", "-o", "out", "--maps", "chart"], "flexpara[bake]"),
         ("moderngl", ["bake", "square.obj", "-o", "out", "--maps", "position"], "flexpara[bake]"),
         ("OpenImageIO", ["bake", "square.obj", "-o", "out", "--maps", "position"], "flexpara[bake]"),

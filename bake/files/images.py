@@ -9,20 +9,14 @@ from __future__ import annotations
 import os
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...runtime.errors import FlexparaError, InputError, MissingDependencyError
 from ..color import srgb_bytes_from_linear, srgb_from_linear
-
-try:
-    import OpenImageIO as oiio  # noqa: N813
-except ImportError as error:
-    raise MissingDependencyError(
-        f"OpenImageIO cannot be imported ({error}), textures are written with it: pip install 'flexpara[bake]'"
-    ) from error
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,6 +24,20 @@ if TYPE_CHECKING:
     from ..texture import Bits, Encoding, Texture
 
 
+class OpenImageIO:
+    """The package, imported where it is first used: files without textures are written without it."""
+
+    def __getattr__(self, name: str) -> Any:
+        """What the package has by that name.  Raises: MissingDependencyError where it is absent."""
+        try:
+            return getattr(import_module("OpenImageIO"), name)
+        except ImportError as error:
+            raise MissingDependencyError(
+                f"OpenImageIO cannot be imported ({error}), textures are written with it: pip install 'flexpara[bake]'"
+            ) from error
+
+
+oiio = OpenImageIO()
 PNG_LEVEL, PNG_FILTER = 2, 0x10
 """zlib's level and libpng's filter SUB alone: a third of the time of its own choice, files 3 % larger."""
 EXR_COMPRESSION = "zip:2"
