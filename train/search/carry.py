@@ -31,7 +31,7 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
     piece = fragments_joined(smooth, areas, graph, config.carry.islet)
     search = laid_on(Search(surface, graph, config), piece, smooth, [found.pieces[int(key)] for key in keys])
     search.split_stretched()
-    search.merge(-np.inf, limit)
+    search.merge_down(limit)
     search.split_down()
     return search
 

@@ -166,7 +166,7 @@ class Search(State):
 
         Once it is ``late``, only what the limits on pieces and stretch ask for.
         """
-        self.merge(-np.inf, most)
+        self.merge_down(most)
         for _ in range(rounds):
             if late() or len(self.settled) >= self.config.vain_splits or not self.improve(most):
                 break
@@ -180,6 +180,18 @@ class Search(State):
             if best is None or (best.gain < 0.0 and self.energy() - best.gain > self.config.most_excess):
                 return
             self.apply_merge(best, least)
+
+    def merge_down(self, most: int) -> None:
+        """Merge down to ``most`` pieces, whatever that costs within the bounds of stretch.
+
+        Where they do not go that far, the limit is broken anyway: then the objective decides.  Pieces far above the
+        limit are not even tried.
+        """
+        before, cost = dict(self.pieces), self.objective()
+        if len(before) <= most + self.config.start.crowded:
+            self.merge(-np.inf, most)
+        if len(self.pieces) > most and self.objective() > cost:
+            self.pieces = before
 
     def worst(self) -> int | None:
         """The key of the piece of highest cost that is not settled; None where none could gain from a split."""
