@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from ..geometry.topology import edge_table
 from ..geometry.triangles import signed_areas, triangle_areas
+from .sheets import uv_on_sheet
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class PointMap(Protocol):
 class Agreement:
     """What `agreement` found.
 
-    chart_agreement: share of points that got the right chart, in [0, 1].
+    chart_agreement: share of points that got the right chart, in [0, 1]; of sheets that coincide either is right.
     seam_agreement: share that also got the right side of the cuts inside that chart: slits are seams too.
     rms_texels, p99_texels: distance between answer and atlas over the points of seam_agreement, texels at 1024²;
     None when there is none.  points: how many were tried.
@@ -63,6 +64,7 @@ def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: i
     """
     points, uv, chart = surface_points(atlas, count, np.random.default_rng(seed))
     answer = point_map.unwrap(points)
+    uv, chart = on_the_same_sheet(atlas, points, uv, chart, answer.chart)
     right = answer.chart == chart
     distance = np.linalg.norm(answer.uv - uv, axis=1) * TEXELS
     far = np.flatnonzero(right & (distance > 2.0 * SEAM_REACH))
@@ -76,6 +78,22 @@ def agreement(point_map: PointMap, atlas: Atlas, *, count: int = 50_000, seed: i
         seam_agreement=float(np.mean(same_side)),
         points=count,
     )
+
+
+def on_the_same_sheet(
+    atlas: Atlas,
+    points: NDArray[np.float64],
+    uv: NDArray[np.float64],
+    chart: NDArray[np.int64],
+    answered: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Uv and chart of the points on the chart answered (n,), where that has a face at the very same place."""
+    other = np.flatnonzero(answered != chart)
+    sheet = uv_on_sheet(atlas, points[other], answered[other])
+    lies = np.isfinite(sheet).all(axis=1)
+    uv, chart = uv.copy(), chart.copy()
+    uv[other[lies]], chart[other[lies]] = sheet[lies], answered[other[lies]]
+    return uv, chart
 
 
 def across_a_seam(

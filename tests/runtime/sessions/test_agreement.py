@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,7 +73,11 @@ def test_a_wrong_chart_lowers_the_agreement_alone() -> None:
 
 
 def test_with_no_right_chart_there_is_no_distance() -> None:
-    found = agreement(ShiftedMap(wrong_above=-1.0), SQUARE)
+    class Elsewhere(ShiftedMap):
+        def unwrap(self, points: NDArray[np.float64]) -> Unwrapped:
+            return super().unwrap(points)._replace(chart=np.full(len(points), 2))
+
+    found = agreement(Elsewhere(), SQUARE)
     assert found.chart_agreement == 0.0
     assert found.rms_texels is None
 
@@ -119,3 +123,34 @@ def test_a_wrong_answer_far_from_any_seam_stays_in_the_distance() -> None:
     assert found.seam_agreement > 0.9
     assert found.rms_texels is not None
     assert found.rms_texels > 100.0
+
+
+def test_of_two_sheets_at_one_place_either_answer_is_right() -> None:
+    """A square with a back, beside it in the atlas; a map that always answers with the front."""
+    both = Atlas(
+        positions=np.concatenate([CORNERS, CORNERS]),
+        faces=np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]]),
+        uv=np.concatenate([CORNERS[:, :2] * 0.5, CORNERS[:, :2] * [-0.5, 0.5] + [1.0, 0.0]]).astype(np.float32),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (8, 1)),
+        face_chart=np.array([0, 0, 1, 1]),
+        source_vertex=np.arange(8),
+        size=2048,
+        padding=0,
+    )
+
+    @dataclass
+    class Front:
+        lift: float = 0.0
+        chart: int = 0
+
+        def unwrap(self, points: NDArray[np.float64]) -> Unwrapped:
+            uv = points[:, :2] * 0.5 + [0.0, self.lift]
+            chart = np.full(len(points), self.chart)
+            return Unwrapped(uv.astype(np.float32), chart, np.ones(len(points), np.float32))
+
+    found = agreement(Front(), both)
+    assert (found.chart_agreement, found.seam_agreement) == (1.0, 1.0)
+    assert found.rms_texels == pytest.approx(0.0, abs=1e-3)
+    assert agreement(Front(lift=1.0 / 1024.0), both).rms_texels == pytest.approx(1.0, abs=1e-3)
+    apart = replace(both, positions=np.concatenate([CORNERS, CORNERS + np.array([0.0, 0.0, 0.01])]))
+    assert agreement(Front(), apart).chart_agreement == pytest.approx(0.5, abs=0.01)
