@@ -147,7 +147,7 @@ class FineConfig:
     """How much farther apart in uv than in space two of them are where a slit runs between them."""
     rings: int = 3
     """Rings of faces around a flipped one that turn as those beside them."""
-    trims: int = 3
+    trims: int = 8
     """Times faces that stay folded are cut off a chart …"""
     most_wrong: float = 1e-3
     """… as long as they are no more than this share of its faces."""
