@@ -77,31 +77,25 @@ def _faces(text: ObjText, loops: Loops) -> dict[int, list[str]]:
 def _statements(text: ObjText, kinds: dict[int, str], faces: dict[int, list[str]], uv: list[str]) -> Iterator[str]:
     """The statements of the new file: uv stand before the first polygon, old ones and names of libraries go.
 
-    A polygon without triangles (it has no area) keeps its corners, without uv; lines lose theirs.
+    A polygon of which no triangle was unwrapped (it has no area, or is there twice) is left out, as in every format:
+    the report's changes count them.  Lines lose their uv.
     """
     waiting = uv
-    start = np.cumsum(text.size) - text.size
-    corner = dict(zip(text.line.tolist(), zip(start.tolist(), (start + text.size).tolist(), strict=True), strict=True))
+    polygons = set(text.line.tolist())
     for index, statement in text.statements.items():
         kind = kinds[index]
-        if kind in ("vt", "mtllib"):
+        if kind in ("vt", "mtllib") or (index in polygons and index not in faces):
             continue
         if kind in ("f", "l"):
             yield from waiting
             waiting = []
         if index in faces:
             yield from faces[index]
-        elif index in corner:
-            yield "f " + " ".join(_without_uv(v, vn) for v, _, vn in (text.corners[slice(*corner[index])] + 1).tolist())
         elif kind == "l":
             yield " ".join(word.split("/")[0] for word in statement.split())
         else:
             yield statement
     yield from waiting
-
-
-def _without_uv(v: int, vn: int) -> str:
-    return f"{v}//{vn}" if vn else str(v)
 
 
 def _material_lines(text: str, names: list[str], shown: Mapping[str, str]) -> Iterator[str]:
