@@ -77,7 +77,7 @@ def _faces(text: ObjText, loops: Loops) -> dict[int, list[str]]:
 def _statements(text: ObjText, kinds: dict[int, str], faces: dict[int, list[str]], uv: list[str]) -> Iterator[str]:
     """The statements of the new file: uv stand before the first polygon, old ones and names of libraries go.
 
-    A polygon of which no triangle was unwrapped (it has no area, or is there twice) is left out, as in every format:
+    A polygon of which no triangle was unwrapped (it has no area, say) is left out, as in every format:
     the report's changes count them.  Lines lose their uv.
     """
     waiting = uv
