@@ -31,7 +31,6 @@ def straightened(search: Search, bands: tuple[int, ...]) -> Search:
         joined = fragments_joined(moved, best.areas, best.graph, best.config.carry.islet)
         sources = [best.pieces[int(key)] for key in keys]
         found = laid_on(Search(best.surface, best.graph, best.config), joined, moved, sources)
-        found.merge(-np.inf, len(best.pieces))
         if len(found.pieces) <= len(best.pieces) and found.objective() < cost:
             best, cost = found, found.objective()
     return best
