@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .runtime import aliases as _aliases  # noqa: F401  # `import flexpara.xatlas` is found through it
 from .runtime import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.errors import FlexparaError
 
@@ -18,13 +19,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy as np
+    import trimesh
     from numpy.typing import NDArray
 
     from . import bake as bake
     from . import export as export
     from . import runtime as runtime
     from . import train as train
+    from .export import xatlas as xatlas
     from .export.assemble import Unwrapped
+    from .export.tensors import Tensors
     from .runtime.files import OutputFolder
     from .runtime.io.meshfile import MeshLike
     from .runtime.io.meshfile import load as load
@@ -46,14 +50,14 @@ _HOME = {
     "Outputs": "options",
     "UnwrapSession": "sessions.session",
 }
-_FOLDERS = ("bake", "export", "runtime", "train")
+_MODULES = ("bake", "export", "runtime", "train", "xatlas")
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name, or one of the four folders, the first time it is asked for."""
+    """Load a public name, or one of the four folders or `xatlas`, the first time it is asked for."""
     if name in _HOME:
         return getattr(import_module(f".runtime.{_HOME[name]}", __name__), name)
-    if name in _FOLDERS:
+    if name in _MODULES:
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
@@ -196,6 +200,25 @@ class UnwrapResult:
     def report(self) -> dict[str, Any]:
         """Changes, settings, metrics, agreement of network and atlas, seconds; ready for JSON."""
         return self.found.report
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """The unwrapped mesh with its uv, v up, as texture visual; vertices are doubled along seams."""
+        import trimesh
+        from trimesh.visual import TextureVisuals
+
+        visual = TextureVisuals(uv=self.atlas.uv)
+        return trimesh.Trimesh(self.atlas.positions, self.atlas.faces, visual=visual, process=False)
+
+    def to_torch(self, device: str = "cpu") -> Tensors:
+        """The atlas as tensors on a device, as nvdiffrast takes them: float32, faces int32.
+
+        Raises: MissingDependencyError: torch is absent.
+        """
+        from .runtime.extras import requires
+
+        with requires("train"):
+            from .export.tensors import as_tensors
+        return as_tensors(self.atlas, device)
 
     def save(
         self,

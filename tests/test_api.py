@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -51,6 +51,23 @@ def test_the_report_holds_settings_metrics_and_agreement() -> None:
     assert set(report["network"]) == {"rms_texels", "p99_texels", "chart_agreement", "seam_agreement", "points"}
     assert set(report["seconds"]) == {"train", "pack", "measure", "export"}
     json.dumps(report, allow_nan=False)
+
+
+def test_a_result_is_a_trimesh_with_its_uv_and_tensors_for_torch() -> None:
+    result = unwrapped()
+    mesh, tensors = result.to_trimesh(), result.to_torch()
+    visual: Any = mesh.visual
+    np.testing.assert_array_equal(visual.uv, result.atlas.uv)
+    np.testing.assert_array_equal(mesh.faces, result.atlas.faces)
+    np.testing.assert_array_equal(mesh.vertices, result.atlas.positions)
+    assert {name: str(value.dtype) for name, value in tensors._asdict().items()} == {
+        "positions": "torch.float32",
+        "faces": "torch.int32",
+        "uv": "torch.float32",
+        "normals": "torch.float32",
+        "source_vertex": "torch.int64",
+    }
+    np.testing.assert_array_equal(tensors.uv[tensors.faces.long()].numpy(), result.atlas.corner_uv)
 
 
 def test_save_writes_what_it_names_and_the_session_reads_it(tmp_path: Path) -> None:

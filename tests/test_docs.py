@@ -11,7 +11,15 @@ from flexpara.__main__ import main
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [
-    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/glossary.md", "docs/benchmarks.md")
+    ROOT / name
+    for name in (
+        "README.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "docs/glossary.md",
+        "docs/benchmarks.md",
+        "docs/xatlas.md",
+    )
 ]
 COMMAND = re.compile(r"^(?:.*&& )?flexpara (\w+) ([^#\n]*)", re.MULTILINE)
 
