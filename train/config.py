@@ -85,7 +85,7 @@ class StartConfig:
     """The same for a part of many handles."""
     behind: float = 1.05
     """Objective of a search begun, as a multiple of the best one's, beyond which it is not finished."""
-    crowded: int = 60
+    crowded: int = 40
     """Pieces of a start that are valid by themselves above which no further start is searched."""
     handles: int = 8
     """Handles above which a part has many."""

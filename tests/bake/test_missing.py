@@ -12,7 +12,9 @@ import sys
 sys.modules[{package!r}] = None
 import flexpara.runtime.errors as errors
 try:
-    import flexpara.bake.{module}
+    import flexpara.bake.{module} as module
+    if {package!r} == "OpenImageIO":  # wanted where the first texture is written or read
+        module.oiio.ImageSpec
 except errors.MissingDependencyError as error:
     assert error.exit_code == 3
     print(error)
