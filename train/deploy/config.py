@@ -88,8 +88,8 @@ class FitConfig:
 class WrapConfig:
     """Their inverse: surface points for uv."""
 
-    samples: SampleConfig = field(default_factory=SampleConfig)
-    """What it is fitted to."""
+    samples: SampleConfig = field(default_factory=lambda: SampleConfig(even=100_000, beside=80_000))
+    """What it is fitted to: the chart is given, so it takes fewer than the networks."""
     grow: GrowConfig = field(default_factory=lambda: GrowConfig(cells=10_000))
     """Its sizes; the grid lies in the atlas."""
     tolerance: float = 1e-3
