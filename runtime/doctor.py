@@ -38,11 +38,13 @@ class Finding:
 def packages() -> Iterator[Finding]:
     """This package and everything that its extras for users ask for, as its metadata lists them."""
     yield Finding(PACKAGE, f"{__version__} on Python {sys.version.split()[0]}")
+    listed = set[str]()
     for requirement in metadata.requires(PACKAGE) or []:
         name = re.split(r"[^\w.-]", requirement)[0]
         extra = "".join(re.findall(r"extra == \"(\w+)\"", requirement))
-        if extra not in USER_EXTRAS:
+        if extra not in USER_EXTRAS or name in listed:
             continue
+        listed.add(name)
         try:
             yield Finding(name, metadata.version(name))
         except metadata.PackageNotFoundError:

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
 from ...runtime.mesh import Surface
-from .contact import boundary_edges, rim_overlaps
 from .pieces import measured
 from .slits import Flat
 
@@ -91,16 +90,27 @@ def attached(
     longest = np.argsort(-length, axis=None, kind="stable")[: min(tries, int(touching.sum()))].tolist()
     for only in [None, *edges.reshape(-1)[longest].tolist()]:
         layout = _Layout(piece, surface, table, only)
-        if (order := layout.add_all(flap)) is not None and is_valid(flat := layout.flat(), len(order)):
+        order = layout.add_all(flap)
+        flat = layout.flat()
+        if order is not None and is_valid(flat, len(order)) and are_clear(flat.uv, len(piece.flat.uv)):
             return np.concatenate([piece.ids, np.array(order, dtype=np.int64)]), flat
     return None
 
 
 def is_valid(flat: Flat, fresh: int) -> bool:
-    """True where the last ``fresh`` faces of a flattening are not flipped, and its border does not cross itself."""
-    faces = flat.surface.faces
-    flipped = flipped_triangles(flat.uv[faces[-fresh:]]).any()
-    return not flipped and not rim_overlaps(faces, boundary_edges(faces), flat.uv)
+    """True where the last ``fresh`` faces of a flattening are not flipped, and no two faces overlap.
+
+    All faces are tested: a flap may lie over the inside of a piece without crossing its border.
+    """
+    corners = flat.uv[flat.surface.faces]
+    return not flipped_triangles(corners[-fresh:]).any() and not overlaps_anywhere(corners)
+
+
+def are_clear(uv: NDArray[np.float64], first: int) -> bool:
+    """True where no point from row ``first`` on lies upon an earlier one: such borders would cross by a rounding."""
+    extent = float(np.ptp(uv, axis=0).max())
+    gaps = np.linalg.norm(uv[first:, None] - uv[None, :first], axis=2)
+    return bool((gaps > 1e-6 * extent).all())
 
 
 class _Layout:

@@ -27,7 +27,7 @@ from .labels import dual_graph
 from .notes import hurried, notes
 from .parts import Part, split_parts
 from .planar import flat_regions
-from .proof import is_valid, verify
+from .proof import is_valid, proven, verify
 from .proxy import simplified, thinned
 from .search import Search
 from .slivers import steadied
@@ -104,8 +104,9 @@ def chart_surface(
         for number, part in enumerate(parts)
         for piece in solved[part.copy_of if part.copy_of >= 0 else number].pieces
     ]
-    pieces.sort(key=lambda piece: int(piece.ids.min()))
     stage("exact check")
+    pieces = [part for piece in pieces for part in proven(surface, piece)]
+    pieces.sort(key=lambda piece: int(piece.ids.min()))
     verify(pieces)
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
@@ -232,6 +233,7 @@ def brought_back(
         found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)
         found.polish()
+    found.mend()
     pieces = list(found.pieces.values())
     return pieces if middle is surface else refined(surface, middle, pieces, config)
 

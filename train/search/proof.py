@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ...runtime.errors import FinishError
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ..finish.fallback import unwrapped_by_xatlas
+from ..finish.flaps import trimmed
+from ..finish.pieces import Overlapping
 
 if TYPE_CHECKING:
+    from ...runtime.mesh import Surface
     from ..finish.pieces import Piece
 
 
@@ -21,6 +26,21 @@ def verify(pieces: list[Piece]) -> None:
                 f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping "
                 "pairs, expected none; please report the mesh"
             )
+
+
+def proven(surface: Surface, piece: Piece) -> list[Piece]:
+    """The piece, or where the exact check fails, what is left without the faces in its way, and these by themselves.
+
+    Edges that lie upon each other in a layout may cross by one rounding once it is scaled.
+    """
+    if is_valid(piece):
+        return [piece]
+    area = float(surface.face_areas().sum())
+    less = trimmed(surface, Overlapping(piece.ids, piece.flat, ()), area, 1.0)
+    if less is None or not is_valid(less.piece):
+        return unwrapped_by_xatlas(surface, piece.ids, area)
+    kept = replace(less.piece, resort=piece.resort)
+    return [kept, *(part for flap in less.flaps for part in unwrapped_by_xatlas(surface, flap, area))]
 
 
 def is_valid(piece: Piece) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.overlap import overlaps_anywhere
 from ...runtime.geometry.topology import edge_table
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.flaps import Trimmed, attached, trimmed
@@ -159,6 +160,22 @@ class State:
                 self.add(wider)
                 return True
         return False
+
+    def mend(self) -> None:
+        """Prove every piece; one that overlaps loses its flaps, or goes to xatlas where they are too large.
+
+        The search tests borders alone, which do not cross where a part of a piece lies wholly inside another.
+        """
+        for key, piece in list(self.pieces.items()):
+            if not overlaps_anywhere(piece.flat.uv[piece.flat.surface.faces]):
+                continue
+            del self.pieces[key]
+            less = self.trimmed(Overlapping(piece.ids, piece.flat, piece.slits))
+            for part in [] if less is not None else unwrapped_by_xatlas(self.surface, piece.ids, self.area):
+                self.add(part)
+            if less is not None:
+                self.add_trimmed(less)
+        self.place_loose()
 
     def place_loose(self) -> None:
         """Give all loose flaps away; those that nothing takes become pieces."""

@@ -8,7 +8,7 @@ import pytest
 from flexpara.runtime.geometry.overlap import overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
-from flexpara.train.finish.flaps import attached, flap_faces, restricted, trimmed
+from flexpara.train.finish.flaps import are_clear, attached, flap_faces, restricted, trimmed
 from flexpara.train.finish.pieces import Overlapping, measured
 from flexpara.train.finish.slits import Flat
 
@@ -84,3 +84,10 @@ def test_where_a_flap_fits_at_one_edge_alone_it_is_put_there(tries: int) -> None
     piece = measured(STRIP, rows, Flat(Surface(points, faces), uv, {}), 2.0)
     found = attached(piece, STRIP, edge_table(STRIP.faces), np.array([2]), tries)
     assert (found is not None) == (tries > 0)
+
+
+def test_a_point_upon_another_is_not_clear_of_it() -> None:
+    uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1e-9]])
+    assert not are_clear(uv, 3)
+    assert are_clear(uv[:3], 2)
+    assert are_clear(uv[:3], 3)
