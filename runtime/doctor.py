@@ -38,7 +38,7 @@ class Finding:
 def packages() -> Iterator[Finding]:
     """This package and everything that its extras for users ask for, as its metadata lists them."""
     yield Finding(PACKAGE, f"{__version__} on Python {sys.version.split()[0]}")
-    listed = set[str]()
+    listed = {PACKAGE}
     for requirement in metadata.requires(PACKAGE) or []:
         name = re.split(r"[^\w.-]", requirement)[0]
         extra = "".join(re.findall(r"extra == \"(\w+)\"", requirement))
