@@ -20,10 +20,10 @@ from ..runtime.pack.density import Square, pack_square
 from ..runtime.pack.packing import Packed
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
+from ..train.charts.recut import recut
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.polygons import whole_polygons
-from ..train.search.recut import recut
 from .metadata import PlacedCharts, Provenance
 from .onnxfile import export_networks
 

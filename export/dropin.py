@@ -23,11 +23,11 @@ from ..runtime.mesh import Asset, Charts, Frame, Surface
 from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import Packed, pack
 from ..runtime.progress import Stages
+from ..train.charts.charts import Finished, chart_surface
+from ..train.charts.recut import recut
 from ..train.config import FinishConfig
 from ..train.finish.fallback import unwrapped_by_xatlas
 from ..train.pipeline import as_charts
-from ..train.search.charts import Finished, chart_surface
-from ..train.search.recut import recut
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

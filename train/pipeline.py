@@ -12,8 +12,8 @@ import numpy as np
 
 from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
+from .charts.charts import Finished, chart_surface
 from .deploy.fit import fit_networks
-from .search.charts import Finished, chart_surface
 
 if TYPE_CHECKING:
     from torch import nn

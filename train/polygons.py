@@ -14,7 +14,7 @@ import numpy as np
 
 from ..runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ..runtime.geometry.topology import edge_table
-from .search.recut import renumbered
+from .charts.recut import renumbered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

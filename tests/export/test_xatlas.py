@@ -22,7 +22,7 @@ from flexpara.export import dropin
 from flexpara.runtime.errors import FinishError, FlexparaError, ShapeError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.io.meshfile import asset_from_arrays
-from flexpara.train.search.charts import chart_surface
+from flexpara.train.charts.charts import chart_surface
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from flexpara.runtime.mesh import Surface
     from flexpara.runtime.progress import Stages
+    from flexpara.train.charts.charts import Finished
     from flexpara.train.config import FinishConfig
-    from flexpara.train.search.charts import Finished
 
 BOX = trimesh.creation.box()
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -1,4 +1,4 @@
-"""What the tests of training share: finished charts by hand, and one torch thread, as small networks want it."""
+"""What the tests of training share: finished charts by hand, moved surfaces, and one torch thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexpara.runtime.mesh import Charts, Frame, Surface
 from flexpara.runtime.samples import make_sample
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -24,6 +24,20 @@ def one_torch_thread() -> Iterator[None]:
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def moved() -> Callable[..., Surface]:
+    """A surface turned, scaled and moved; mirrored where asked, with its faces still outwards."""
+
+    def move(surface: Surface, *, size: float = 1.0, seed: int = 0, mirrored: bool = False) -> Surface:
+        rng = np.random.default_rng(seed)
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn)) * (-1.0 if mirrored else 1.0)
+        vertices = size * surface.vertices @ turn.T + rng.normal(size=3) * 5.0
+        return Surface(vertices, surface.faces[:, [0, 2, 1]] if mirrored else surface.faces)
+
+    return move
 
 
 def charts_by(face_chart: NDArray[np.int64], corner_uv: NDArray[np.float64]) -> Charts:

@@ -23,6 +23,9 @@ from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import boundary_loops, edge_table, split_non_manifold_vertices
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
+from ..carry.proxy import simplified
+from ..charts.charts import Finished
+from ..charts.proof import verify
 from ..config import FinishConfig
 from ..finish.contact import Relaxed, excess_energy, relax
 from ..finish.disks import cut_open
@@ -30,10 +33,7 @@ from ..finish.flatten import circle_map
 from ..finish.openings import slit_along
 from ..finish.pieces import Piece, border_length
 from ..finish.slits import Flat, Slit, slit_where_it_pays
-from ..search.charts import Finished
 from ..search.labels import connected_pieces, dual_graph
-from ..search.proof import verify
-from ..search.proxy import simplified
 from ..search.search import Search
 from ..workers import parallel_map
 from .conformal import ConformalConfig, conformal_steps, is_valid

@@ -18,11 +18,11 @@ from ...runtime.geometry.metrics import measure
 from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_areas, triangle_areas
 from ...runtime.mesh import Charts, Frame, Surface
 from ...runtime.progress import Stages
+from ..charts.charts import chart_surface
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
 from ..pipeline import Trained, as_charts
 from ..sampling import sample_surface
-from ..search.charts import chart_surface
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
 from .learnedseams import SeamConfig, cut_points, tears
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.progress import Progress
-    from ..search.charts import Finished
+    from ..charts.charts import Finished
     from .checkpoint import Checkpoints
     from .config import PaperConfig
     from .networks import PaperNetworks

@@ -1,4 +1,4 @@
-"""Which faces become one chart: parts, flat regions unfolded exactly, a search by splitting, merging and slitting.
+"""The search: pieces split, merged and slit to where borders pay, from starts by clusters or learned scores.
 
-Public face: `charts.chart_surface`.
+Public face: `search.Search`.
 """

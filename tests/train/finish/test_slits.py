@@ -23,6 +23,7 @@ from flexpara.runtime.samples import make_sample
 from flexpara.train.finish.config import SlitConfig
 from flexpara.train.finish.contact import boundary_edges, excess_energy
 from flexpara.train.finish.flatten import flatten
+from flexpara.train.finish.openings import slit_along
 from flexpara.train.finish.slits import (
     Flat,
     Slit,
@@ -292,3 +293,19 @@ def test_size_does_not_matter() -> None:
     open_, slits = slit_further(flattened(small))
     assert len(slits) == len(slit_further(flattened(sock(24, 1.0)))[1])
     assert_valid(open_)
+
+
+def test_slits_repeat_on_a_finer_mesh_of_the_same_shape() -> None:
+    coarse = flattened(sock(20, 1.0))
+    open_, slits = slit_further(coarse)
+    assert len(slits) > 1
+    assert border_length(slit_along(coarse.surface, slits, CONFIG)) == pytest.approx(border_length(open_.surface))
+    fine = sock(40, 1.0)
+    again = slit_along(fine, slits, CONFIG)
+    assert np.array_equal(again.triangles, fine.triangles)
+    assert euler_characteristic(again.faces) == 1
+    assert len(boundary_loops(again.faces)) == 1
+    assert border_length(again) - border_length(fine) == pytest.approx(
+        border_length(open_.surface) - border_length(coarse.surface), rel=0.2
+    )
+    assert excess(flattened(again)) < 0.1 * excess(flattened(fine))

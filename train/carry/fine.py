@@ -27,11 +27,11 @@ from ..finish.openings import openings, slit_along
 from ..finish.pieces import Piece, extract, measured, try_piece
 from ..finish.slits import Flat
 from ..finish.twolevel import TwoLevel
+from ..search.labels import dual_graph
+from ..search.search import Search
 from ..workers import parallel_map
 from .carry import fragments_joined, smoothed_in_band, votes
-from .labels import dual_graph
 from .layout import carried_jacobians
-from .search import Search
 from .sides import faces_beside
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import pytest
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths
+from flexpara.train.charts.develop import Development, Unfolding, fill, grouped, rigid_motion, unfold
+from flexpara.train.charts.planar import flat_regions
 from flexpara.train.config import PlanarConfig
-from flexpara.train.search.develop import Development, Unfolding, fill, grouped, rigid_motion, unfold
-from flexpara.train.search.planar import flat_regions
 
 if TYPE_CHECKING:
     from collections.abc import Callable

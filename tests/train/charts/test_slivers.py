@@ -9,8 +9,8 @@ import pytest
 
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.charts.slivers import longest_sides, steadied
 from flexpara.train.config import SliverConfig
-from flexpara.train.search.slivers import longest_sides, steadied
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,8 +11,8 @@ from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths, signed_areas
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.charts.planar import deviations, flat_regions, heights, plane_of
 from flexpara.train.config import PlanarConfig
-from flexpara.train.search.planar import deviations, flat_regions, heights, plane_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

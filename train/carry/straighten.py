@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..search.labels import smooth_labels
+from ..search.search import Search
 from .carry import fragments_joined, laid_on
-from .labels import smooth_labels
-from .search import Search
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .labels import DualGraph
+    from ..search.labels import DualGraph
 
 
 def straightened(search: Search, bands: tuple[int, ...]) -> Search:

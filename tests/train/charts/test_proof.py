@@ -9,9 +9,9 @@ pytest.importorskip("igl")
 
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.mesh import Surface
+from flexpara.train.charts.proof import is_valid, proven, verify
 from flexpara.train.finish.pieces import Piece, measured
 from flexpara.train.finish.slits import Flat
-from flexpara.train.search.proof import is_valid, proven, verify
 
 STRIP = Surface(
     np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0.5]]), np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])

@@ -9,11 +9,11 @@ pytest.importorskip("igl")
 
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry.layout import nearest_faces
+from flexpara.train.carry.sides import CoarseMap, faces_beside, torn_apart
 from flexpara.train.config import FinishConfig
 from flexpara.train.finish.openings import slit_along
 from flexpara.train.finish.slits import Flat, Slit
-from flexpara.train.search.layout import nearest_faces
-from flexpara.train.search.sides import CoarseMap, faces_beside, torn_apart
 
 CONFIG = FinishConfig()
 SLIT = Slit(np.array([[-1.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))

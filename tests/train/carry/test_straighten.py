@@ -11,10 +11,10 @@ from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry.straighten import shortest_borders, straightened
 from flexpara.train.config import FinishConfig
 from flexpara.train.search.labels import dual_graph
 from flexpara.train.search.search import Search
-from flexpara.train.search.straighten import shortest_borders, straightened
 
 
 def halves_with_teeth() -> tuple[Search, np.ndarray]:

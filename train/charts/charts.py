@@ -16,23 +16,23 @@ import numpy as np
 from ...runtime.deadline import Late, never
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
+from ..carry.carry import carried_back
+from ..carry.fine import refined
+from ..carry.proxy import simplified, thinned
+from ..carry.straighten import straightened
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
+from ..search.labels import dual_graph
+from ..search.search import Search
+from ..search.starts import clusters, pieces_by_score
 from ..workers import one_thread_each, parallel_map
-from .carry import carried_back
 from .develop import Development, unfold
-from .fine import refined
-from .labels import dual_graph
 from .notes import hurried, notes
 from .parts import Part, split_parts
 from .planar import flat_regions
 from .proof import is_valid, proven, verify
-from .proxy import simplified, thinned
-from .search import Search
 from .slivers import steadied
-from .starts import clusters, pieces_by_score
-from .straighten import straightened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from ...runtime.progress import Stages
     from ..config import FinishConfig
-    from .labels import DualGraph
+    from ..search.labels import DualGraph
 
     Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 

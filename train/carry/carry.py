@@ -9,16 +9,16 @@ from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
 from ..finish.pieces import Overlapping, Piece
-from .labels import border_lengths, connected_pieces, dual_graph, smooth_labels
+from ..search.labels import border_lengths, connected_pieces, dual_graph, smooth_labels
+from ..search.search import Search
 from .layout import carried_uv, features
-from .search import Search
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
     from ..config import CarryConfig, FinishConfig
-    from .labels import DualGraph
+    from ..search.labels import DualGraph
 
 
 def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:

@@ -15,16 +15,17 @@ from flexpara.runtime.geometry.topology import boundary_loops, edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry import fine
+from flexpara.train.carry.fine import bounded, laid_out, refined, rotations, weights_of, without_folds, wrong_faces
+from flexpara.train.carry.layout import nearest_faces
+from flexpara.train.carry.proxy import thinned
+from flexpara.train.charts import charts
+from flexpara.train.charts.charts import chart_surface, objective
 from flexpara.train.config import FineConfig, FinishConfig
 from flexpara.train.finish.arap import nearest_rotations
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.finish.pieces import Piece, make_piece
 from flexpara.train.finish.slits import Flat
-from flexpara.train.search import charts, fine
-from flexpara.train.search.charts import chart_surface, objective
-from flexpara.train.search.fine import bounded, laid_out, refined, rotations, weights_of, without_folds, wrong_faces
-from flexpara.train.search.layout import nearest_faces
-from flexpara.train.search.proxy import thinned
 
 CONFIG = FinishConfig()
 MIDDLE = FineConfig(faces=3000)

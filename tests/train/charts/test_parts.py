@@ -9,7 +9,7 @@ import pytest
 
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.search.parts import Part, is_copy, pattern, split_parts
+from flexpara.train.charts.parts import Part, is_copy, pattern, split_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable

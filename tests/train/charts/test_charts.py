@@ -18,11 +18,11 @@ from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
+from flexpara.train.charts import charts as module
+from flexpara.train.charts.charts import Finished, chart_surface, objective
+from flexpara.train.charts.proof import verify
 from flexpara.train.config import FinishConfig, StartConfig
 from flexpara.train.finish.flatten import jacobians
-from flexpara.train.search import charts as module
-from flexpara.train.search.charts import Finished, chart_surface, objective
-from flexpara.train.search.proof import verify
 from flexpara.train.search.search import Search
 
 if TYPE_CHECKING:

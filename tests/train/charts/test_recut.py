@@ -6,7 +6,7 @@ import numpy as np
 
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.mesh import Charts, Surface
-from flexpara.train.search.recut import laid_flat, recut, smaller_of_each
+from flexpara.train.charts.recut import laid_flat, recut, smaller_of_each
 
 QUAD = Surface(np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 STRIP = Surface(

@@ -14,9 +14,9 @@ from flexpara.runtime.geometry.topology import components, edge_table, euler_cha
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry import proxy
+from flexpara.train.carry.proxy import simplified, thinned, topology_of
 from flexpara.train.config import FineConfig
-from flexpara.train.search import proxy
-from flexpara.train.search.proxy import simplified, thinned, topology_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,19 +12,19 @@ from flexpara.runtime.geometry.overlap import flipped_triangles
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.config import CarryConfig, FinishConfig
-from flexpara.train.finish.contact import excess_energy
-from flexpara.train.finish.flatten import flatten
-from flexpara.train.finish.slits import Flat
-from flexpara.train.search.carry import (
+from flexpara.train.carry.carry import (
     carried_back,
     fragments_joined,
     smoothed_in_band,
     votes,
 )
+from flexpara.train.carry.layout import carried_uv, face_frames, turned_into
+from flexpara.train.carry.proxy import simplified
+from flexpara.train.config import CarryConfig, FinishConfig
+from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.flatten import flatten
+from flexpara.train.finish.slits import Flat
 from flexpara.train.search.labels import DualGraph, connected_pieces, dual_graph
-from flexpara.train.search.layout import carried_uv, face_frames, turned_into
-from flexpara.train.search.proxy import simplified
 from flexpara.train.search.search import Search
 
 CONFIG = FinishConfig()

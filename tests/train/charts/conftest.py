@@ -80,20 +80,6 @@ def solid() -> Callable[[str], Surface]:
 
 
 @pytest.fixture
-def moved() -> Callable[..., Surface]:
-    """A surface turned, scaled and moved; mirrored where asked, with its faces still outwards."""
-
-    def move(surface: Surface, *, size: float = 1.0, seed: int = 0, mirrored: bool = False) -> Surface:
-        rng = np.random.default_rng(seed)
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        turn *= np.sign(np.linalg.det(turn)) * (-1.0 if mirrored else 1.0)
-        vertices = size * surface.vertices @ turn.T + rng.normal(size=3) * 5.0
-        return Surface(vertices, surface.faces[:, [0, 2, 1]] if mirrored else surface.faces)
-
-    return move
-
-
-@pytest.fixture
 def together() -> Callable[..., Surface]:
     """Several surfaces as one, in that order."""
 
