@@ -117,10 +117,11 @@ def unwrap_asset(
 
     with requires("unwrap"):
         from .export.assemble import assemble
+        from .runtime.io.shading import shaded
         from .runtime.pack.density import square_of
         from .train.presets import train_asset
 
-    clock = Clock.of(progress)
+    clock, asset = Clock.of(progress), shaded(asset, options.crease_angle)
     trained = train_asset(asset, options, clock, keep)
     return UnwrapResult(asset, assemble(asset, trained, clock, square_of(options)))
 
@@ -150,7 +151,7 @@ def unwrap_cloud(
 class UnwrapResult:
     """An unwrapped mesh or point cloud.
 
-    asset: the mesh as read and cleaned, or the triangles laid over the points.  found: what came of it.
+    asset: the mesh as read and cleaned, with normals, or the triangles laid over the points.  found: what came of it.
     cloud, cloud_mesh: of a point cloud, the points and where each lies on those triangles; else None.
     """
 

@@ -238,8 +238,9 @@ def export(
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
     from .runtime.io.changes import lost
+    from .runtime.io.shading import shaded
 
-    asset = load(mesh, options.select)
+    asset = shaded(load(mesh, options.select), options.crease_angle)
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
         outputs = outputs.for_asset(asset)
         console.note_changes(asset, lost(asset, outputs))

@@ -103,12 +103,13 @@ def bake(
         console: See Console.
     """
     options = replace(options, padding=padding_of(options.padding, options.target, options.size))
-    high = _high_source(source)
+    high = _high_source(source, options.crease_angle)
     chosen_maps(options.outputs, high=high)
     from ..runtime.files import OutputFolder
     from ..runtime.io.meshfile import load
+    from ..runtime.io.shading import shaded
 
-    asset = load(mesh, options.select)
+    asset = shaded(load(mesh, options.select), options.crease_angle)
     console.note_changes(asset)
     job = _job(_layout(asset, options, console), asset, options, high)
     if not job.maps:
@@ -179,7 +180,7 @@ def settings(options: BakeOptions, source: HighOptions) -> dict[str, Any]:
     return plain | {name: [path.name for path in plain[name]] for name in ("fields", "high")}
 
 
-def _high_source(options: HighOptions) -> HighSource | None:
+def _high_source(options: HighOptions, crease_angle: float) -> HighSource | None:
     """The high-poly meshes and how far rays reach for them.  Raises: InputError for a cage that is neither."""
     if not options.high:
         return None
@@ -187,6 +188,7 @@ def _high_source(options: HighOptions) -> HighSource | None:
         from .highpoly.cage import CageSettings
         from .highpoly.highmaps import HighSource
     from ..runtime.io.meshfile import load_asset
+    from ..runtime.io.shading import shaded
 
     try:
         cage = CageSettings(float(options.cage), match_names=options.match_names)
@@ -194,4 +196,4 @@ def _high_source(options: HighOptions) -> HighSource | None:
         if isinstance(error, InputError):
             raise
         cage = CageSettings(cage=load_asset(Path(options.cage)), match_names=options.match_names)
-    return HighSource([load_asset(path, instances=True) for path in options.high], cage)
+    return HighSource([shaded(load_asset(path, instances=True), crease_angle) for path in options.high], cage)

@@ -106,7 +106,8 @@ class Asset:
     document: the scene that the mesh is the surface of, each of its meshes once; None for a file that holds nothing
     but a mesh.  part: (f,) int64, the part of it that each face is in; origin: (n,) int64, the vertex of that part that
     each file vertex is; both None without a document.  polygons: what the triangles were, None for a format of
-    triangles.  obj: the text of an OBJ file.
+    triangles.  obj: the text of an OBJ file.  smoothing: (f,) int64, the smoothing group of each face, 0 for a flat
+    one; None where the file doesn't say.
     """
 
     positions: NDArray[np.float64]
@@ -126,6 +127,7 @@ class Asset:
     document: Document | None = None
     polygons: Polygons | None = None
     obj: ObjText | None = None
+    smoothing: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, eq=False)

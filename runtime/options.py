@@ -66,6 +66,13 @@ class SourceOptions:
 
     select: Names = ()
     """Nodes and meshes of a glTF scene to work on, by name; all else comes back as it is.  By default all of it."""
+    crease_angle: float = 30.0
+    """Degrees between two faces, 0 to 180, above which the edge between them is sharp, where a file has no normals.
+    Facets of STL files and smoothing groups of OBJ files decide without it."""
+
+    def __post_init__(self) -> None:
+        found = f"crease-angle is {self.crease_angle}, expected 0 to 180 degrees"
+        demand(0.0 <= self.crease_angle <= 180.0, f"{found}; pass for instance --crease-angle 30")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +116,7 @@ class ChartOptions(SourceOptions):
     """Seconds after which preset fast ends with the best valid charts so far, maps not counted; by default none."""
 
     def __post_init__(self) -> None:
+        SourceOptions.__post_init__(self)
         fits = self.time_budget is None or (self.time_budget > 0.0 and self.preset == "fast")
         demand(fits, f"time-budget is {self.time_budget}, expected seconds above 0 and preset fast; leave it out")
         demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
@@ -141,6 +149,7 @@ class AtlasOptions(SourceOptions):
     """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
 
     def __post_init__(self) -> None:
+        SourceOptions.__post_init__(self)
         (low, high), most = SIZES, self.size // 8
         demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
         dense = self.texel_density is None or self.texel_density > 0
@@ -299,10 +308,11 @@ def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str
 
 
 def _as_field(name: str, default: object, value: Any) -> Any:
-    """The value as the field holds it: integers of numpy as int, several names as a tuple."""
+    """The value as the field holds it: integers of numpy as int or float, several names as a tuple."""
     if isinstance(default, tuple):
         return names(value) if isinstance(value, str) else tuple(value)
     plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+    plain = float(plain) if type(plain) is int and isinstance(default, float) else plain
     fits = default is None or type(plain) is type(default)
     demand(fits, f"{name} is {value!r}, expected a value like {default!r}; pass one of type {type(default).__name__}")
     return plain

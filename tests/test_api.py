@@ -154,3 +154,16 @@ def test_an_unknown_keyword_is_refused_with_the_name_meant(tmp_path: Path) -> No
     with pytest.raises(InputError, match=r"colour is no option, expected some of .*; leave it out"):
         unwrapped().save(tmp_path / "out", colour=1)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_roof_without_normals_is_sharp_above_the_crease_angle_and_its_uv_stay() -> None:
+    vertices = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 1], [2, 0, 1]]
+    faces = [[0, 1, 2], [0, 2, 3], [1, 0, 4], [1, 4, 5]]
+    sharp, smooth = (flexpara.unwrap((vertices, faces), size=64, crease_angle=angle) for angle in (89, 91))
+    np.testing.assert_array_equal(sharp.atlas.corner_uv, smooth.atlas.corner_uv)
+    assert sharp.onnx == smooth.onnx
+    assert len(sharp.atlas.uv) == len(smooth.atlas.uv) + 2
+    flat = np.repeat([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]], 6, axis=0)
+    np.testing.assert_allclose(sharp.atlas.normals[sharp.atlas.faces].reshape(-1, 3), flat, atol=1e-6)
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(smooth.atlas.normals[smooth.atlas.faces[:2, 0]], [[0.0, half, half]] * 2, atol=1e-6)

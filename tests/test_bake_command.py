@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from flexpara.__main__ import main
 
@@ -151,3 +152,31 @@ def test_maps_that_are_the_same_all_over_are_said_to_be_so(square: Path, capsys:
     out = square.parent / "out"
     assert main(["bake", str(square), "-o", str(out), "--size", "32", "--maps", "normal,position"]) == 0
     assert capsys.readouterr().err == "flexpara: note: the map normal is the same all over (0, 0, 1); leave it out\n"
+
+
+def roof(square: Path, kind: str) -> Path:
+    """A high-poly of two slopes over the square, 90 degrees apart, as a file without normals."""
+    vertices = [[-1, -1, -1], [0.5, -1, 0.5], [0.5, 2, 0.5], [-1, 2, -1], [2, -1, -1], [2, 2, -1]]
+    faces = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]
+    path = square.parent / f"roof.{kind}"
+    trimesh.Trimesh(vertices, faces, process=False).export(path)
+    return path
+
+
+@pytest.mark.parametrize(("kind", "words"), [("stl", ()), ("ply", ()), ("ply", ("--crease-angle", "89"))])
+def test_flat_faces_of_a_high_poly_without_normals_bake_to_flat_colours(
+    square: Path, kind: str, words: tuple[str, ...]
+) -> None:
+    asked = "--maps", "normal", "--texture-format", "exr", "--cage", "1"
+    baked(square, "--high", str(roof(square, kind)), *asked, *words)
+    image = read_image(square.parent / "out" / "square_normal.exr")
+    slope = np.sqrt(0.5)
+    assert image[:, :16] == pytest.approx(np.broadcast_to([-slope, 0.0, slope], (32, 16, 3)), abs=1e-3)
+    assert image[:, 16:] == pytest.approx(np.broadcast_to([slope, 0.0, slope], (32, 16, 3)), abs=1e-3)
+
+
+def test_a_crease_angle_above_that_of_the_edge_bakes_a_gradient(square: Path) -> None:
+    asked = "--maps", "normal", "--texture-format", "exr", "--cage", "1", "--crease-angle", "91"
+    baked(square, "--high", str(roof(square, "ply")), *asked)
+    across = read_image(square.parent / "out" / "square_normal.exr")[16, :, 0]
+    assert (np.diff(across) > 0.0).all()

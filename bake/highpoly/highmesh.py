@@ -5,15 +5,16 @@ f faces of all meshes together · n their vertices.  Positions are in source uni
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...runtime.geometry.normals import smooth_normals
 from ...runtime.geometry.triangles import signed_areas, triangle_areas
+from ...runtime.io.shading import shaded
 from ...runtime.material import Material
 from ...runtime.mesh import Asset, Atlas, Surface
+from ...runtime.options import SourceOptions
+from ...runtime.pack.seamvertices import atlas_normals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
 
 
 def merge_assets(assets: Sequence[Asset]) -> Asset:
-    """Several assets as one, faces in order; each with normals (smooth where it has none).
+    """Several assets as one, faces in order; each with normals (where it has none, as without `--crease-angle`).
 
     Colours are white and uv 0 where only some have them.
     """
-    ready = [asset if asset.normals is not None else _with_normals(asset) for asset in assets]
+    ready = [shaded(asset, SourceOptions.crease_angle) for asset in assets]
     if len(ready) == 1:
         return ready[0]
     vertices = np.cumsum([0, *(len(asset.positions) for asset in ready)])
@@ -64,12 +65,11 @@ def atlas_of(asset: Asset, density: float) -> Atlas:
     if asset.uv is not None:
         own = uv_per_unit(asset.positions[asset.faces], asset.uv[asset.faces])
         uv = asset.uv * (density / own if own > 0.0 else 1.0)
-    normals = asset.normals if asset.normals is not None else smooth_normals(asset.surface)[asset.weld]
     return Atlas(
         positions=asset.positions,
         faces=asset.faces,
         uv=uv.astype(np.float32),
-        normals=normals.astype(np.float32),
+        normals=atlas_normals(asset, np.arange(len(asset.positions))),
         face_chart=np.zeros(len(asset.faces), np.int64),
         source_vertex=np.arange(len(asset.positions)),
         size=1,
@@ -81,11 +81,6 @@ def uv_per_unit(triangles: NDArray[np.float64], corner_uv: NDArray[np.float64]) 
     """Length in uv of a source unit, on average over faces (f, 3, 3) with uv (f, 3, 2); 0 without uv area."""
     area, uv_area = triangle_areas(triangles).sum(), np.abs(signed_areas(corner_uv)).sum()
     return float(np.sqrt(uv_area / max(area, np.finfo(np.float64).tiny)))
-
-
-def _with_normals(asset: Asset) -> Asset:
-    """The asset with smooth normals."""
-    return replace(asset, normals=smooth_normals(asset.surface)[asset.weld])
 
 
 def _face_material(asset: Asset) -> NDArray[np.int64]:

@@ -36,7 +36,7 @@ class RawMesh:
     document: the scene that these triangles are of.  part: (f,) int64, the part of it that each face is in.  origin:
     (n,) int64, the vertex of that part that each vertex is.  body: (n,) int64, the object that each vertex belongs to;
     vertices of two bodies are never one.  polygons: what the triangles are in the file, where it holds polygons.  obj:
-    the text of an OBJ file.
+    the text of an OBJ file.  smoothing: (f,) int64, the smoothing group of each face, 0 for a flat one, or None.
     """
 
     positions: NDArray[np.float64]
@@ -53,6 +53,7 @@ class RawMesh:
     document: Document | None = None
     polygons: Polygons | None = None
     obj: ObjText | None = None
+    smoothing: NDArray[np.int64] | None = None
 
 
 def check(raw: RawMesh) -> None:

@@ -1,4 +1,6 @@
-"""STL, binary and ascii → RawMesh: three vertices a triangle, in the file's order; facet normals are left out.
+"""STL, binary and ascii → RawMesh: three vertices a triangle, in the file's order, each facet flat.
+
+Its normal is that of its corners; the one in the file is left out.
 
 Which of the two a file is, its size says: binary are 84 bytes and 50 a triangle, whatever the first word is.
 """
@@ -76,4 +78,5 @@ def _ascii(data: bytes) -> RawMesh:
 
 def _soup(positions: np.ndarray, trailing: int) -> RawMesh:
     faces = np.arange(len(positions), dtype=np.int64).reshape(-1, 3)
-    return RawMesh(positions=positions, faces=faces, changes={"trailing_bytes": trailing})
+    flat = np.zeros(len(faces), dtype=np.int64)
+    return RawMesh(positions=positions, faces=faces, smoothing=flat, changes={"trailing_bytes": trailing})

@@ -40,6 +40,8 @@ def test_padding_follows_the_size_unless_given(size: int, margin: int) -> None:
         ({"padding": -1}, {"padding": 0}),
         ({"padding": 257}, {"padding": 256}),
         ({"seed": -1}, {"seed": 0}),
+        ({"crease_angle": -0.1}, {"crease_angle": 0.0}),
+        ({"crease_angle": 180.5}, {"crease_angle": 180.0}),
         ({"seed": 2**32}, {"seed": 2**32 - 1}),
         ({"preset": "slow"}, {"preset": "fast"}),
         ({"mode": "both", "preset": "paper"}, {"mode": "global", "preset": "paper"}),
@@ -56,7 +58,7 @@ def test_padding_follows_the_size_unless_given(size: int, margin: int) -> None:
     ],
 )
 def test_each_bound_is_exact_and_named(wrong: dict[str, Any], right: dict[str, Any]) -> None:
-    name = next(iter(wrong))
+    name = next(iter(wrong)).replace("_", "-")
     with pytest.raises(InputError, match=f"{name} is .*expected .*;"):
         Options(**wrong)
     Options(**right)
@@ -75,6 +77,12 @@ def test_layers_do_not_fit_what_names_one_file_a_map(wrong: dict[str, Any]) -> N
     with pytest.raises(InputError, match=r"layers with .*expected .*leave"):
         Outputs(layers=True, **wrong)
     Outputs(layers=True)
+
+
+def test_a_whole_number_of_degrees_is_taken() -> None:
+    assert from_keywords(Options, None, {"crease_angle": 45}).crease_angle == 45.0
+    with pytest.raises(InputError, match=r"crease_angle is '45', expected .*; pass one of type float"):
+        from_keywords(Options, None, {"crease_angle": "45"})
 
 
 def test_auto_stands_for_what_the_source_has() -> None:

@@ -63,6 +63,7 @@ def _with_faces(raw: RawMesh, kept: NDArray[np.int64], flip: NDArray[np.bool_]) 
         faces=_turned(raw.faces[kept], flip),
         face_material=None if raw.face_material is None else raw.face_material[kept],
         part=None if raw.part is None else raw.part[kept],
+        smoothing=None if raw.smoothing is None else raw.smoothing[kept],
         polygons=None if polygons is None else replace(polygons, corner=_turned(polygons.corner[kept], flip)),
     )
 
@@ -96,6 +97,7 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         document=part.document,
         polygons=part.polygons,
         obj=part.obj,
+        smoothing=part.smoothing,
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-KINDS = ("v", "vt", "vn", "f", "usemtl", "mtllib", "l", "p")
+KINDS = ("v", "vt", "vn", "f", "usemtl", "mtllib", "l", "p", "s")
 TABLES = KINDS[:4]
 """Kinds of which a file has as many lines as vertices and faces."""
 

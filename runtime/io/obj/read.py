@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .lines import Lines
 
 COLOR_COLUMNS = {6: 3, 7: 4}  # x y z r g b, and x y z w r g b: numbers in a line → first colour
+OFF = ("off", "0")
 # (slashes, two in a row) of every corner of a file → which of v, vt, vn its numbers are
 UNIFORM = {(0, False): (0,), (1, False): (0, 1), (2, True): (0, 2), (2, False): (0, 1, 2)}
 
@@ -83,6 +84,7 @@ def read_obj(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         face_material=face_material,
         changes=changes,
         polygons=Polygons(triangles, polygons.size),
+        smoothing=_smoothing(lines, polygons.number[polygon]),
         obj=ObjText(data, polygons.number, corners, polygons.size, _library_text(lines, read_sibling)),
     )
 
@@ -203,6 +205,17 @@ def _uv(file_uv: NDArray[np.float64], width: NDArray[np.int64], index: NDArray[n
     if columns == 2:
         table[:-1, 1][width < 2] = 0.0
     return table[index]
+
+
+def _smoothing(lines: Lines, at_line: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """(f,) smoothing group of each triangle, by its line: 0 is off; None where the file has no such line."""
+    if not lines.text["s"]:
+        return None
+    words = [OFF[0], *(text.strip().lower() or OFF[0] for text in lines.text["s"])]
+    groups = (word for word in dict.fromkeys(words) if word not in OFF)
+    place = {word: index for index, word in enumerate(groups, start=1)}
+    number = np.array([place.get(word, 0) for word in words], dtype=np.int64)
+    return number[np.searchsorted(lines.number["s"], at_line)]
 
 
 def _libraries(lines: Lines, read_sibling: Callable[[str], bytes | None]) -> list[str]:

@@ -1,7 +1,8 @@
 """An OBJ file with new uv: its own lines, with other vt and other numbers of them in its faces.
 
-Positions, normals, names, groups, smoothing, lines and points are the very lines of the file.  Its material libraries
-become one beside it, in which baked pictures take the place of those on the old uv.
+Positions, normals, names, groups, smoothing, lines and points are the very lines of the file; where it has no normals,
+those of the atlas come in.  Its material libraries become one beside it, in which baked pictures take the place of
+those on the old uv.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
 from ..loops import loops_of
 from .text import PICTURES, is_picture, keyword
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from ...mesh import Asset, Atlas
     from ..loops import Loops
@@ -44,7 +48,10 @@ def rewrite_obj(atlas: Atlas, asset: Asset, text: ObjText, path: Path, pictures:
     head = ["# flexpara: uv are v up", *([f"mtllib {library.name}"] if has_materials else [])]
     if shown and "usemtl" not in named.values():
         head.append(f"usemtl {MADE_UP}")
-    body = _statements(text, named, _faces(text, loops), _uv_lines(atlas, loops))
+    uv, of_uv = _uv(atlas, loops)
+    normals, of_normal = ([], text.corners[loops.corner, 2] + 1) if "vn" in named.values() else _normals(atlas, loops)
+    numbers = np.column_stack([text.corners[loops.corner, 0] + 1, of_uv, of_normal])
+    body = _statements(text, named, _faces(text, loops, numbers), [*uv, *normals])
     path.write_text("\n".join([*head, *body]).rstrip("\n") + "\n", encoding="utf-8")
     if has_materials:
         used = [text.statements[line].partition(" ")[2].strip() for line, kind in named.items() if kind == "usemtl"]
@@ -53,21 +60,25 @@ def rewrite_obj(atlas: Atlas, asset: Asset, text: ObjText, path: Path, pictures:
     return loops
 
 
-def _uv_lines(atlas: Atlas, loops: Loops) -> list[str]:
-    """A vt for each atlas vertex that a polygon has, in their order."""
-    used = np.unique(loops.vertex)
-    return [f"vt {u!r} {v!r}" for u, v in atlas.uv[used].astype(np.float64).tolist()]
+def _uv(atlas: Atlas, loops: Loops) -> tuple[list[str], NDArray[np.int64]]:
+    """A vt for each uv of a polygon, in the order of atlas vertices, and the number from 1 of that of each corner."""
+    used, place = np.unique(loops.vertex, return_inverse=True)
+    rows = atlas.uv[used].astype(np.float64)
+    label = by_first_appearance(equal_rows(rows))
+    return [f"vt {u!r} {v!r}" for u, v in rows[first_of_each(label)].tolist()], label[place.reshape(-1)] + 1
 
 
-def _faces(text: ObjText, loops: Loops) -> dict[int, list[str]]:
-    """Line number → the lines of its polygon."""
-    place = np.unique(loops.vertex, return_inverse=True)[1].reshape(-1) + 1
-    corners, found = text.corners[loops.corner] + 1, dict[int, list[str]]()
-    words = [
-        f"{v}/{vt}/{vn}" if vn else f"{v}/{vt}"
-        for v, vt, vn in zip(corners[:, 0].tolist(), place.tolist(), corners[:, 2].tolist(), strict=True)
-    ]
-    start = 0
+def _normals(atlas: Atlas, loops: Loops) -> tuple[list[str], NDArray[np.int64]]:
+    """A vn for each normal of the atlas, and the number from 1 of that of each corner."""
+    rows = atlas.normals[loops.vertex].astype(np.float64)
+    label = by_first_appearance(equal_rows(rows))
+    return [f"vn {x!r} {y!r} {z!r}" for x, y, z in rows[first_of_each(label)].tolist()], label + 1
+
+
+def _faces(text: ObjText, loops: Loops, numbers: NDArray[np.int64]) -> dict[int, list[str]]:
+    """Line number → the lines of its polygon.  numbers: (c, 3) of v, vt and vn of each corner, 0 for none."""
+    words = [f"{v}/{vt}/{vn}" if vn else f"{v}/{vt}" for v, vt, vn in numbers.tolist()]
+    found, start = dict[int, list[str]](), 0
     for size, polygon in zip(loops.size.tolist(), loops.polygon.tolist(), strict=True):
         found.setdefault(int(text.line[polygon]), []).append("f " + " ".join(words[start : start + size]))
         start += size

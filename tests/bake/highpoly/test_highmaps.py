@@ -141,7 +141,8 @@ def test_the_low_poly_mesh_with_its_map_looks_like_the_high_poly_mesh(models: Pa
     normal = smooth_normals(low.surface)
     wave = 0.004 * np.sin(12 * low.surface.vertices).sum(axis=1, keepdims=True)
     dented = Surface(low.surface.vertices + wave * normal, low.surface.faces)
-    high = Asset(dented.vertices, dented.faces, np.arange(len(dented.vertices)), dented)
+    smooth = smooth_normals(dented)
+    high = Asset(dented.vertices, dented.faces, np.arange(len(dented.vertices)), dented, normals=smooth)
     size = 512
     image = bake(atlas, low, [HighSource([high]).find_map("normal")], size=size)["normal"].pixels
     frame = Frame.of(low.surface.vertices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import trimesh
 
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.io.obj.rewrite import rewrite_obj
+from flexpara.runtime.io.shading import shaded
 from flexpara.runtime.mesh import Asset, Atlas
 
 SOURCE = """# a plan
@@ -47,9 +49,9 @@ def asset(tmp_path: Path) -> Asset:
 def atlas_of(asset: Asset) -> Atlas:
     count = len(asset.positions)
     uv = np.column_stack([np.arange(count) / 8, np.arange(count) / 16]).astype(np.float32)
-    zeros = np.zeros((count, 3), np.float32)
+    normals = np.zeros((count, 3), np.float32) if asset.normals is None else asset.normals.astype(np.float32)
     chart = np.zeros(len(asset.faces), np.int64)
-    return Atlas(asset.positions, asset.faces, uv, zeros, chart, np.arange(count), 16, 1)
+    return Atlas(asset.positions, asset.faces, uv, normals, chart, np.arange(count), 16, 1)
 
 
 def written(asset: Asset, folder: Path, pictures: dict[str, str]) -> list[str]:
@@ -111,3 +113,26 @@ def test_another_program_reads_it(asset: Asset, tmp_path: Path) -> None:
     assert isinstance(found, trimesh.Trimesh)
     assert len(found.faces) == 3
     np.testing.assert_allclose(found.area, asset.surface.face_areas().sum())
+
+
+def test_normals_come_in_where_the_file_has_none(tmp_path: Path) -> None:
+    path = tmp_path / "source.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\n", encoding="utf-8")
+    lines = written(shaded(load_asset(path), 30.0), tmp_path, {})
+    assert [line for line in lines if line.startswith("vn ")] == ["vn 0.0 0.0 1.0", "vn 0.0 1.0 0.0"]
+    corners = [word.split("/") for line in lines if line.startswith("f ") for word in line.split()[1:]]
+    assert [corner[0] for corner in corners] == ["1", "2", "3", "2", "1", "4"]
+    assert [corner[2] for corner in corners] == ["1", "1", "1", "2", "2", "2"]
+
+
+def test_corners_with_the_same_uv_share_its_line(tmp_path: Path) -> None:
+    """Whatever else splits their vertices."""
+    path = tmp_path / "source.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\n", encoding="utf-8")
+    asset = shaded(load_asset(path), 30.0)
+    assert asset.obj is not None
+    atlas = replace(atlas_of(asset), uv=asset.positions[:, [0, 2]].astype(np.float32))
+    rewrite_obj(atlas, asset, asset.obj, tmp_path / "result.obj", {})
+    lines = (tmp_path / "result.obj").read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if line.startswith("vt ")] == ["vt 0.0 0.0", "vt 1.0 0.0", "vt 0.0 1.0"]
+    assert [line for line in lines if line.startswith("f ")] == ["f 1/1/1 2/2/1 3/2/1", "f 2/2/2 1/1/2 4/3/2"]

@@ -31,6 +31,8 @@ def test_a_binary_file_of_the_right_size_is_binary_whatever_its_header(header: b
     raw = read_stl(binary(header))
     np.testing.assert_array_equal(raw.positions[raw.faces], CORNERS)
     assert raw.normals is None
+    assert raw.smoothing is not None
+    assert raw.smoothing.tolist() == [0, 0]
     assert not any(raw.changes.values())
 
 
