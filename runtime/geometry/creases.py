@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .normals import smooth_normals, unit
-from .topology import edge_table, face_components
+from .topology import edge_table, face_components, stable_order
 from .triangles import corner_angles
 
 if TYPE_CHECKING:
@@ -59,9 +59,10 @@ def faces_along_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def repeated(labels: NDArray[np.int64]) -> NDArray[np.int64]:
     """(p, 2) places of labels (n,) that hold the same, each with the next such place."""
-    order = np.argsort(labels, kind="stable")
-    same = labels[order][1:] == labels[order][:-1]
-    return np.stack([order[:-1][same], order[1:][same]], axis=1)
+    order = stable_order(labels, int(labels.max(initial=0)) + 1)
+    sorted_labels = labels[order]
+    same = np.flatnonzero(sorted_labels[1:] == sorted_labels[:-1])
+    return np.stack([order[same], order[same + 1]], axis=1)
 
 
 def smooth_pairs(surface: Surface, faces: NDArray[np.int64], angle: float) -> NDArray[np.bool_]:

@@ -72,9 +72,9 @@ def test_every_line_but_uv_faces_and_libraries_is_the_file_s(asset: Asset, tmp_p
 def test_a_polygon_without_area_is_left_out(tmp_path: Path) -> None:
     faces = "f 1 2 3\nf 1 2 2\n"
     (tmp_path / "thin.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + faces, encoding="utf-8")
-    asset = load_asset(tmp_path / "thin.obj")
+    asset = shaded(load_asset(tmp_path / "thin.obj"), 30.0)
     assert len(asset.faces) == 1
-    assert [line for line in written(asset, tmp_path, {}) if line.startswith("f")] == ["f 1/1 2/2 3/3"]
+    assert [line for line in written(asset, tmp_path, {}) if line.startswith("f")] == ["f 1/1/1 2/2/1 3/3/1"]
 
 
 def test_polygons_keep_positions_and_normals_and_get_the_new_uv(asset: Asset, tmp_path: Path) -> None:
