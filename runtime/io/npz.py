@@ -29,6 +29,6 @@ def write_npz(atlas: Atlas, asset: Asset, path: Path) -> None:
         uv=atlas.uv,
         charts=atlas.face_chart,
         normals=atlas.normals,
-        source_vertex=atlas.source_vertex,
+        source_vertex=atlas.source_vertex if asset.unsplit is None else asset.unsplit[atlas.source_vertex],
         polygons=polygons,
     )

@@ -63,6 +63,7 @@ def with_corner_normals(asset: Asset, normals: NDArray[np.float64]) -> Asset:
         faces=number[piece].reshape(-1, 3),
         weld=asset.weld[source],
         normals=rows[first[order]],
+        unsplit=source,
         colors=None if asset.colors is None else asset.colors[source],
         uv=None if asset.uv is None else asset.uv[source],
         origin=None if asset.origin is None else asset.origin[source],

@@ -92,3 +92,5 @@ def test_split_vertices_keep_what_the_file_says_of_them_and_the_surface_stays() 
     assert found.uv[found.faces].tolist() == asset.uv[asset.faces].tolist()
     assert found.colors[found.faces].tolist() == asset.colors[asset.faces].tolist()
     assert found.weld[found.faces].tolist() == asset.surface.faces.tolist()
+    assert found.unsplit is not None
+    assert found.unsplit[found.faces].tolist() == asset.faces.tolist()
