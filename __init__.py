@@ -172,8 +172,10 @@ class UnwrapResult:
 
     @property
     def atlas(self) -> Atlas:
-        """Packed charts."""
-        return self.found.atlas
+        """Packed charts; source_vertex counts the vertices of the file, not those that normals split."""
+        from .runtime.io.shading import with_file_vertices
+
+        return with_file_vertices(self.found.atlas, self.asset)
 
     def point_uv(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Of a point cloud: uv (n, 2) float32 in [0, 1], v up, and chart (n,) int64 of each of its points.
@@ -281,7 +283,7 @@ class UnwrapResult:
         if self.cloud is not None:
             self._write_points(output, self.cloud)
         apart = report["metrics"]["overlap_fraction"] == 0.0
-        job = BakeJob.of(self.atlas, self.asset, outputs, maps)
+        job = BakeJob.of(self.found.atlas, self.asset, outputs, maps)
         report |= write_outputs(output, job, clock, apart=apart)
         if cut := report.pop("polygons_cut"):
             report["changes"]["polygons_cut"] = cut

@@ -167,3 +167,11 @@ def test_a_roof_without_normals_is_sharp_above_the_crease_angle_and_its_uv_stay(
     np.testing.assert_allclose(sharp.atlas.normals[sharp.atlas.faces].reshape(-1, 3), flat, atol=1e-6)
     half = np.sqrt(0.5)
     np.testing.assert_allclose(smooth.atlas.normals[smooth.atlas.faces[:2, 0]], [[0.0, half, half]] * 2, atol=1e-6)
+
+
+def test_atlas_vertices_name_vertices_of_the_file_where_normals_split_them() -> None:
+    vertices = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 1], [2, 0, 1]], float)
+    result = flexpara.unwrap((vertices, [[0, 1, 2], [0, 2, 3], [1, 0, 4], [1, 4, 5]]), size=64)
+    assert len(result.asset.positions) == 8
+    np.testing.assert_array_equal(vertices[result.atlas.source_vertex], result.atlas.positions)
+    np.testing.assert_array_equal(result.asset.positions[: len(vertices)], vertices)

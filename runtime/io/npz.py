@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .shading import with_file_vertices
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -29,6 +31,6 @@ def write_npz(atlas: Atlas, asset: Asset, path: Path) -> None:
         uv=atlas.uv,
         charts=atlas.face_chart,
         normals=atlas.normals,
-        source_vertex=atlas.source_vertex if asset.unsplit is None else asset.unsplit[atlas.source_vertex],
+        source_vertex=with_file_vertices(atlas, asset).source_vertex,
         polygons=polygons,
     )

@@ -17,7 +17,7 @@ from ..geometry.rows import equal_rows, first_of_each
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..mesh import Asset
+    from ..mesh import Asset, Atlas
 
 ALIKE = 2.0**-16
 """Step on which components of normals are compared: those of facets in one plane differ by rounding."""
@@ -68,3 +68,8 @@ def with_corner_normals(asset: Asset, normals: NDArray[np.float64]) -> Asset:
         uv=None if asset.uv is None else asset.uv[source],
         origin=None if asset.origin is None else asset.origin[source],
     )
+
+
+def with_file_vertices(atlas: Atlas, asset: Asset) -> Atlas:
+    """The atlas with source_vertex into the vertices as the file has them; those are the first of the asset's."""
+    return atlas if asset.unsplit is None else replace(atlas, source_vertex=asset.unsplit[atlas.source_vertex])
