@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from . import export as export
     from . import runtime as runtime
     from . import train as train
+    from .bake.repack.repacked import pack as pack
     from .export import xatlas as xatlas
     from .export.assemble import Unwrapped
     from .export.tensors import Tensors
@@ -35,20 +36,35 @@ if TYPE_CHECKING:
     from .runtime.io.points.cloud import CloudMesh, PointCloud
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.options import Options, Outputs
+    from .runtime.packoptions import PackOptions as PackOptions
     from .runtime.progress import Progress
     from .runtime.sessions.session import UnwrapSession
     from .train.deploy.gated import GatedExperts
 
 __version__ = "0.1.0"
-__all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "UnwrapResult", "UnwrapSession", "load", "unwrap"]
+__all__ = [
+    "Asset",
+    "Atlas",
+    "FlexparaError",
+    "Options",
+    "Outputs",
+    "PackOptions",
+    "UnwrapResult",
+    "UnwrapSession",
+    "load",
+    "pack",
+    "unwrap",
+]
 
 _HOME = {
-    "Asset": "mesh",
-    "Atlas": "mesh",
-    "load": "io.meshfile",
-    "Options": "options",
-    "Outputs": "options",
-    "UnwrapSession": "sessions.session",
+    "Asset": "runtime.mesh",
+    "Atlas": "runtime.mesh",
+    "load": "runtime.io.meshfile",
+    "Options": "runtime.options",
+    "Outputs": "runtime.options",
+    "PackOptions": "runtime.packoptions",
+    "pack": "bake.repack.repacked",
+    "UnwrapSession": "runtime.sessions.session",
 }
 _MODULES = ("bake", "export", "runtime", "train", "xatlas")
 
@@ -56,7 +72,7 @@ _MODULES = ("bake", "export", "runtime", "train", "xatlas")
 def __getattr__(name: str) -> object:
     """Load a public name, or one of the four folders or `xatlas`, the first time it is asked for."""
     if name in _HOME:
-        return getattr(import_module(f".runtime.{_HOME[name]}", __name__), name)
+        return getattr(import_module(f".{_HOME[name]}", __name__), name)
     if name in _MODULES:
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

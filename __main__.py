@@ -21,6 +21,7 @@ from cyclopts.exceptions import CycloptsError
 from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cloud
 from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
+from .bake.repack.commands import pack
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Console, Manners, complain
 from .runtime.deadline import Deadline, interrupts_ask
@@ -46,7 +47,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for command in (query, bake, evaluate, sample):
+for command in (query, bake, pack, evaluate, sample):
     app.command(command)
 
 

@@ -65,7 +65,7 @@ def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> 
         staged[kind] = path
 
     for kind in (name for name in writers if name in job.outputs.formats):
-        output.write(f"{output.stem}.{kind}", partial(write, kind))
+        output.write(f"{job.asset.stem}.{kind}", partial(write, kind))
     from .files.written import Reading, parts_of, written_report
 
     staged.pop("npz", None)  # the arrays themselves

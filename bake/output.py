@@ -54,20 +54,27 @@ class BakeJob:
         return cls(with_tangents(atlas, maps), asset, outputs, maps)
 
 
-def write_outputs(output: OutputFolder, job: BakeJob, clock: Clock, *, apart: bool = False) -> dict[str, Any]:
+def write_outputs(
+    output: OutputFolder, job: BakeJob, clock: Clock, *, apart: bool = False, pieces: Sequence[BakeJob] = ()
+) -> dict[str, Any]:
     """Textures, meshes in each format, preview; for the report what is known of "textures", and "written" of meshes.
 
-    apart: whether no two triangles of the atlas are known to overlap in uv.
+    apart: whether no two triangles of the atlas are known to overlap in uv.  pieces: the meshes that the job's is made
+    of, where they are files of their own with one set of textures.
     Raises: as `baker.bake`; ForeignFileError, InputError as OutputFolder.write.
     """
     baked = bake_textures(output, job, clock)
     with clock.stage("write"):
-        files = MeshJob(job.atlas, job.asset, job.outputs, baked.textures, baked.files)
-        written = write_meshes(output, files, apart=apart)
+        written: dict[str, Any] = {}
+        for piece in pieces or [job]:
+            files = MeshJob(piece.atlas, piece.asset, piece.outputs, baked.textures, baked.files)
+            named = f"{piece.asset.stem}." if len(pieces) > 1 else ""
+            written |= {f"{named}{kind}": facts for kind, facts in write_meshes(output, files, apart=apart).items()}
     if job.outputs.preview:
         with clock.stage("preview"):
             _write_preview(output, job.atlas, job.asset)
-    cut = loops_of(job.atlas, job.asset).cut if set(POLYGONS) & set(job.outputs.formats) else 0
+    with_polygons = [piece for piece in pieces or [job] if set(POLYGONS) & set(piece.outputs.formats)]
+    cut = sum(loops_of(piece.atlas, piece.asset).cut for piece in with_polygons)
     return {"textures": texture_facts(job.atlas, baked), "written": written, "polygons_cut": cut}
 
 

@@ -26,6 +26,8 @@ WORDS = {
     "faces_without_colors": "{} without colours made white|face|faces",
     "faces_without_uv": "{} without uv in a mesh that has them|face|faces",
     "flipped_faces": "{} turned to agree with the others around|face|faces",
+    "flat_islands": "{} without area in uv left in one point|island|islands",
+    "invalid_islands": "{} with triangles that overlap or are turned over, as in the file|island|islands",
     "missing_materials": "{} of materials not found beside the mesh|file|files",
     "missing_textures": "{} not found or in a format that is not read|texture|textures",
     "missing_uv_or_normals": "{} referring to uv or normals that the file does not hold|corner|corners",

@@ -93,6 +93,14 @@ class DensityConfig:
 
 
 @dataclass(frozen=True)
+class IslandConfig:
+    """What counts as an island of a mesh that has uv."""
+
+    flat: float = 1e-9
+    """Area of an island, beside that of as many faces on the average, up to which it has none."""
+
+
+@dataclass(frozen=True)
 class PackConfig:
     """All of them."""
 
@@ -100,5 +108,6 @@ class PackConfig:
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
     density: DensityConfig = field(default_factory=DensityConfig)
+    islands: IslandConfig = field(default_factory=IslandConfig)
     recuts: int = 4
     """How often charts that float32 can't hold are cut again and all are packed anew."""

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..errors import FinishError
 from ..geometry.metrics import uv_charts
 from ..geometry.topology import edge_table
+from ..geometry.triangles import signed_areas
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,11 +20,15 @@ if TYPE_CHECKING:
 
 
 def outline_edges(faces: NDArray[np.int64], charts: Charts) -> NDArray[np.bool_]:
-    """(f, 3) bool: edge i of the face lies on the outline of its chart; faces (f, 3) over welded vertices."""
+    """(f, 3) bool: edge i of the face lies on the outline of its chart; faces (f, 3) over welded vertices.
+
+    Where a chart is folded over, as other tools' may be, the fold is a part of its outline.
+    """
     table = edge_table(faces)
     _, seam = uv_charts(faces, charts.corner_uv, table)
-    side = charts.face_chart[table.edge_faces]
-    return (seam | ~table.manifold | (side[:, 0] != side[:, 1]))[table.face_edges]
+    side, turn = charts.face_chart[table.edge_faces], np.sign(signed_areas(charts.corner_uv))[table.edge_faces]
+    apart = (side[:, 0] != side[:, 1]) | (turn[:, 0] != turn[:, 1])
+    return (seam | ~table.manifold | apart)[table.face_edges]
 
 
 def chart_outlines(charts: Charts, outline: NDArray[np.bool_]) -> list[NDArray[np.float64]]:

@@ -12,7 +12,7 @@ is written.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -127,6 +127,20 @@ def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, size: int, padding: i
         size=size,
         padding=padding,
         placement=fitted.placement,
+    )
+
+
+def atlas_of_corners(asset: Asset, face_chart: NDArray[np.int64], corner_uv: NDArray[np.float32], like: Atlas) -> Atlas:
+    """The mesh with uv (f, 3, 2) for each corner of its faces, of the size and padding of another atlas."""
+    faces, source_vertex, uv = split_vertices(asset.faces, face_chart, corner_uv.astype(np.float64))
+    return replace(
+        like,
+        positions=asset.positions[source_vertex],
+        faces=faces,
+        uv=uv.astype(np.float32),
+        normals=atlas_normals(asset, source_vertex),
+        face_chart=face_chart,
+        source_vertex=source_vertex,
     )
 
 

@@ -1,0 +1,200 @@
+"""Meshes whose islands got a page of their own, and the files that are written of them.   f faces."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...runtime.errors import InputError
+from ...runtime.geometry.metrics import measure
+from ...runtime.options import from_keywords
+from ...runtime.pack.density import square_of
+from ...runtime.pack.repack import repack
+from ...runtime.packoptions import PackOptions, PackOutputs
+from ...runtime.progress import Clock
+from ..checks import check_outputs, chosen_maps
+from ..highpoly.highmesh import merge_assets
+from ..output import BakeJob, texture_notes, write_outputs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ...runtime.files import OutputFolder
+    from ...runtime.io.meshfile import MeshLike
+    from ...runtime.mesh import Asset, Atlas
+    from ...runtime.progress import Progress
+
+TOGETHER = "packed"
+"""Name of the textures and the report of several meshes on one page."""
+
+
+@dataclass(frozen=True, eq=False)
+class PackResult:
+    """Meshes whose islands share a page.
+
+    assets: the meshes as read and cleaned.  suffixes: endings of their files.  asset: all of them as one mesh.
+    atlas: its islands in their new places.  report: changes, settings, metrics; ready for JSON.
+    """
+
+    assets: tuple[Asset, ...]
+    suffixes: tuple[str, ...]
+    asset: Asset = field(repr=False)
+    atlas: Atlas = field(repr=False)
+    report: dict[str, Any] = field(repr=False)
+
+    @property
+    def atlases(self) -> list[Atlas]:
+        """The atlas of each mesh."""
+        return parted(self.atlas, self.assets)
+
+    def save(
+        self,
+        folder: str | Path,
+        outputs: PackOutputs | None = None,
+        *,
+        force: bool = False,
+        progress: Progress | None = None,
+        **keywords: Any,
+    ) -> tuple[Path, ...]:
+        """Write the meshes, the textures baked onto the new uv, preview and report, all or none; returns their paths.
+
+        Args:
+            folder: made where it is absent.
+            outputs: what is written; None: its defaults.
+            force: whether files are overwritten that flexpara did not write.
+            progress: called as progress(stage, step, steps, loss).
+            **keywords: fields of `PackOutputs`, in place of those of outputs: maps=(), formats=("glb",), …
+
+        Raises: as `UnwrapResult.save`.
+        """
+        from ...runtime.files import OutputFolder
+
+        outputs = from_keywords(PackOutputs, outputs, keywords)
+        with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
+            return self.write(output, outputs, Clock(progress))
+
+    def jobs(self, outputs: PackOutputs) -> tuple[BakeJob, list[BakeJob]]:
+        """What is baked, all meshes as one, and what is written: each mesh for itself, with the same maps.
+
+        Raises: as `Outputs.for_asset`, `chosen_maps`.
+        """
+        shared = outputs.for_mesh(self.asset, self.suffixes[0])
+        maps = chosen_maps(shared, seed=self.report["settings"]["seed"])
+        whole = BakeJob.of(self.atlas, self.asset, shared, maps)
+        each = zip(parted(whole.atlas, self.assets), self.assets, self.suffixes, strict=True)
+        return whole, [
+            BakeJob(atlas, asset, replace(outputs.for_mesh(asset, ending), maps=shared.maps), maps)
+            for atlas, asset, ending in each
+        ]
+
+    def write(
+        self, output: OutputFolder, outputs: PackOutputs, clock: Clock, note: Callable[[str], None] = lambda _: None
+    ) -> tuple[Path, ...]:
+        """As `save`, into an open OutputFolder.  note: called with each fact that a user should know."""
+        from ...runtime.io.changes import told
+
+        whole, pieces = self.jobs(outputs)
+        named = [f"{piece.asset.stem}.{kind}" for piece in pieces for kind in piece.outputs.formats]
+        check_outputs(output, whole.outputs, whole.maps, meshes=False, more=named)
+        apart = self.report["metrics"]["overlap_fraction"] == 0.0
+        report = {**self.report, "outputs": asdict(whole.outputs)}
+        report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
+        cut = {"polygons_cut": report.pop("polygons_cut")}
+        report["changes"] = {**report["changes"], **(cut if any(cut.values()) else {})}
+        for fact in (*told(cut), *texture_notes(report["textures"])):
+            note(f"{self.asset.stem}: {fact}")
+        output.write_report({**report, "seconds": {name: round(value, 3) for name, value in clock.seconds.items()}})
+        return output.commit()
+
+
+def pack(
+    *mesh: MeshLike, options: PackOptions | None = None, progress: Progress | None = None, **keywords: Any
+) -> PackResult:
+    """Pack the islands of uv that meshes have into one page; their shapes stay.
+
+    Args:
+        *mesh: paths, or trimesh.Trimesh with uv.
+        options: what decides the result, see `flexpara.PackOptions`; None: its defaults.
+        progress: called as progress(stage, step, steps, loss).
+        **keywords: fields of `flexpara.PackOptions`, in place of those of options: size=2048, padding=4, …
+
+    Raises:
+        InputError: a mesh or an option is wrong, or a mesh has no uv.
+    """
+    from ...runtime.io.meshfile import load
+    from ...runtime.io.shading import shaded
+
+    options = from_keywords(PackOptions, options, keywords)
+    assets = [shaded(load(entry, options.select), options.crease_angle) for entry in mesh]
+    endings = [Path(entry).suffix if isinstance(entry, str | Path) else ".glb" for entry in mesh]
+    return pack_assets(assets, endings, options, None, Clock.of(progress))
+
+
+def pack_assets(
+    assets: Sequence[Asset], suffixes: Sequence[str], options: PackOptions, uv_set: int | None, clock: Clock
+) -> PackResult:
+    """Pack the islands of some meshes into one page.
+
+    Args:
+        assets: the meshes.
+        suffixes: endings of their files.
+        options: see `PackOptions`.
+        uv_set: the uv set whose islands are packed; None is the one that materials are read with.
+        clock: for progress.
+
+    Raises: as `repack`; InputError for two meshes of one name.
+    """
+    stems = [asset.stem for asset in assets]
+    if len(set(stems)) < len(stems) or (len(stems) > 1 and TOGETHER in stems):
+        raise InputError(f"meshes named {', '.join(stems)}, expected names of their own; rename one")
+    assets = [asset if uv_set is None else _with_set(asset, uv_set) for asset in assets]
+    whole = merge_assets(assets)
+    whole = whole if len(assets) == 1 else replace(whole, stem=TOGETHER)
+    with clock.stage("pack"):
+        packed = repack(whole, square_of(options), equal=options.density == "equal", seed=options.seed)
+    with clock.stage("measure"):
+        metrics = measure(whole.surface, packed.atlas.corner_uv, packed.atlas.face_chart, size=options.size)
+    changes = [asset.changes for asset in assets] + [packed.report["changes"]]
+    report = {
+        "version": __version__,
+        "sources": [{"stem": one.stem, "sha256": one.sha256, "faces": len(one.faces)} for one in assets],
+        "changes": {name: sum(one.get(name, 0) for one in changes) for one in changes for name in one if one[name]},
+        "settings": {**asdict(options), "padding": options.margin},
+        "pack": packed.report,
+        "metrics": metrics.to_dict(),
+    }
+    return PackResult(tuple(assets), tuple(suffixes), whole, packed.atlas, report)
+
+
+def _with_set(asset: Asset, number: int) -> Asset:
+    """The mesh with one of its uv sets as its uv.  Raises: InputError where it has none."""
+    from ...runtime.io.gltf.uvsets import uv_of_set
+
+    return replace(asset, uv=uv_of_set(asset, number))
+
+
+def parted(atlas: Atlas, assets: Sequence[Asset]) -> list[Atlas]:
+    """The atlas of each of the meshes that were joined to the mesh of an atlas."""
+    if len(assets) == 1:
+        return [atlas]
+    face = np.cumsum([0, *(len(asset.faces) for asset in assets)])
+    first = np.cumsum([0, *(len(asset.positions) for asset in assets)])
+    found = []
+    for number in range(len(assets)):
+        own = slice(face[number], face[number + 1])
+        used, corners = np.unique(atlas.faces[own], return_inverse=True)
+        part = replace(
+            atlas,
+            positions=atlas.positions[used],
+            faces=corners.reshape(-1, 3).astype(np.int64),
+            uv=atlas.uv[used],
+            normals=atlas.normals[used],
+            face_chart=atlas.face_chart[own],
+            source_vertex=atlas.source_vertex[used] - first[number],
+        )
+        found.append(part)
+    return found

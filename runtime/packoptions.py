@@ -1,0 +1,59 @@
+"""What `flexpara pack` may be asked: see options.py, whose rules hold here too."""
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from .options import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded, demand
+from .words import Flag, Names
+
+if TYPE_CHECKING:
+    from .mesh import Asset
+
+OWN = "own"
+"""Format of a file as it was given."""
+DENSITIES = ("equal", "kept")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackOptions(Seeded, AtlasOptions):
+    """How the islands that a mesh has are packed.
+
+    Raises: InputError for a value outside what its field allows.
+    """
+
+    density: Literal["equal", "kept"] = "equal"
+    """Texels per unit of the source: equal on all islands, or kept as they are beside each other."""
+
+    def __post_init__(self) -> None:
+        AtlasOptions.__post_init__(self)
+        Seeded.__post_init__(self)
+        found = f"density is {self.density!r}, expected equal or kept"
+        demand(self.density in DENSITIES, f"{found}; pass for instance --density kept")
+        both = self.density == "kept" and self.texel_density is not None
+        demand(not both, "density kept with a texel-density, expected one of the two; leave the other out")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackOutputs(Outputs):
+    """What `flexpara pack` writes."""
+
+    formats: Annotated[Names, Parameter(name="--format")] = (OWN,)
+    """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda and npz; by default the format of
+    each mesh, and glb where that can't be written."""
+    inverse: Annotated[Flag, Parameter(show=False)] = False
+
+    def __post_init__(self) -> None:
+        demand(not self.inverse, "inverse with pack, which fits no networks, expected unwrap; leave it out")
+        if self.formats == (OWN,):
+            MapOptions.__post_init__(self)
+        else:
+            Outputs.__post_init__(self)
+
+    def for_mesh(self, asset: "Asset", suffix: str) -> Outputs:
+        """The same as an unwrap has it, for one mesh from a file of that ending: as `Outputs.for_asset`."""
+        kind = suffix.lower().removeprefix(".")
+        kinds = (kind if kind in FORMATS else "glb",) if self.formats == (OWN,) else self.formats
+        plain = {field.name: getattr(self, field.name) for field in fields(Outputs)}
+        return Outputs(**{**plain, "formats": kinds}).for_asset(asset)

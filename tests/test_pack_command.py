@@ -1,0 +1,138 @@
+"""`flexpara pack` from its words to its files: formats kept, textures moved, several meshes on one page."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import flexpara
+from flexpara.__main__ import main
+from flexpara.runtime.io.meshfile import load_asset
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytest.importorskip("moderngl")
+
+from flexpara.bake.files.images import read_image
+
+HOUSE = """mtllib house.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 3 0 0
+v 4 0 0
+v 4 1 0
+v 3 1 0
+vt 0 0
+vt 0.5 0
+vt 0.5 0.5
+vt 0 0.5
+vt 0.5 0.5
+vt 1 0.5
+vt 1 1
+vt 0.5 1
+o wall
+usemtl paint
+f 1/1 2/2 3/3 4/4
+o roof
+f 5/5 6/6 7/7 8/8
+"""
+PLATE = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property float s
+property float t
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0 0 0
+2 0 0 1 0
+2 1 0 1 0.5
+0 1 0 0 0.5
+4 0 1 2 3
+"""
+RED, BLUE = (255, 0, 0), (0, 0, 255)
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """Two quads on half of a texture: the first red, the second blue."""
+    path = tmp_path / "house.obj"
+    path.write_text(HOUSE, encoding="utf-8")
+    (tmp_path / "house.mtl").write_text("newmtl paint\nmap_Kd house.png\n", encoding="utf-8")
+    pixels = np.zeros((64, 64, 3), np.uint8)
+    pixels[32:, :32], pixels[:32, 32:] = RED, BLUE
+    Image.fromarray(pixels).save(tmp_path / "house.png")
+    return path
+
+
+def packed(*meshes: Path, out: Path, words: tuple[str, ...] = ()) -> int:
+    return main(["pack", *map(str, meshes), "-o", str(out), "--size", "64", "--quiet", *words])
+
+
+def color_at(picture: np.ndarray, uv: np.ndarray) -> list[int]:
+    """Colour at a point of uv, v up, as stored."""
+    size = len(picture)
+    column, row = int(uv[0] * size), int((1.0 - uv[1]) * size)
+    return picture[row, column, :3].tolist()
+
+
+def test_an_obj_stays_an_obj_line_by_line_and_its_texture_moves(house: Path, tmp_path: Path) -> None:
+    assert packed(house, out=tmp_path / "out") == 0
+    lines = (tmp_path / "out" / "house.obj").read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if line.startswith(("v ", "o "))] == [
+        line for line in HOUSE.splitlines() if line.startswith(("v ", "o "))
+    ]
+    assert sum(line.startswith("f ") for line in lines) == 2
+    made = load_asset(tmp_path / "out" / "house.obj")
+    assert made.uv is not None
+    corner_uv, picture = made.uv[made.faces], read_image(tmp_path / "out" / "house_base-color.png")
+    assert color_at(picture, corner_uv[0].mean(axis=0)) == list(RED)
+    assert color_at(picture, corner_uv[2].mean(axis=0)) == list(BLUE)
+    assert np.ptp(corner_uv.reshape(-1, 2), axis=0).max() > 0.9
+
+
+def test_several_meshes_share_a_page_and_its_textures(house: Path, tmp_path: Path) -> None:
+    path = tmp_path / "plate.ply"
+    path.write_text(PLATE, encoding="utf-8")
+    assert packed(house, path, out=tmp_path / "out", words=("--preview",)) == 0
+    files = {entry.name for entry in (tmp_path / "out").iterdir()}
+    assert {"house.obj", "house.mtl", "plate.ply", "packed_base-color.png", "packed.preview.png"} <= files
+    assert not any(name.startswith(("house_", "plate_")) for name in files)
+    report = json.loads((tmp_path / "out" / "packed.report.json").read_text(encoding="utf-8"))
+    assert [source["stem"] for source in report["sources"]] == ["house", "plate"]
+    assert report["metrics"]["charts"] == 3
+    assert report["metrics"]["overlap_fraction"] == 0.0
+    picture = read_image(tmp_path / "out" / "packed_base-color.png")
+    made = load_asset(tmp_path / "out" / "house.obj")
+    assert made.uv is not None
+    assert color_at(picture, made.uv[made.faces[2]].mean(axis=0)) == list(BLUE)
+
+
+def test_the_api_packs_and_saves(house: Path, tmp_path: Path) -> None:
+    result = flexpara.pack(house, size=64, padding=1)
+    assert result.atlas.size == 64
+    assert result.report["pack"]["islands"] == 2
+    written = result.save(tmp_path / "out", maps=(), preview=False, formats=("ply",))
+    assert {path.name for path in written} == {"house.ply", "house.report.json"}
+
+
+def test_a_mesh_without_uv_is_refused_with_the_remedy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trimesh.creation.box().export(tmp_path / "box.ply")
+    assert packed(tmp_path / "box.ply", out=tmp_path / "out") == 2
+    assert "unwrap it first" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_networks_are_refused(house: Path, tmp_path: Path) -> None:
+    assert packed(house, out=tmp_path / "out", words=("--inverse",)) == 2
