@@ -309,7 +309,12 @@ class UnwrapResult:
             for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
-        output.write_report({**report, "seconds": {**report["seconds"], **seconds}})
+        report["seconds"] = {**report["seconds"], **seconds}
+        if outputs.report:
+            from .bake.report.gather import write_result
+
+            write_result(output, self.atlas, self.asset, report)
+        output.write_report(report)
         return output.commit()
 
     def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:

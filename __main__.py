@@ -22,6 +22,7 @@ from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cl
 from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
 from .bake.repack.commands import pack
+from .bake.report.commands import report
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Console, Manners, complain
 from .runtime.deadline import Deadline, interrupts_ask
@@ -47,7 +48,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for command in (query, bake, pack, evaluate, sample):
+for command in (query, bake, pack, evaluate, report, sample):
     app.command(command)
 
 
@@ -130,7 +131,7 @@ def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outpu
             return _perform(Run(source, output, options, outputs), console)
         if "glb" not in outputs.formats:  # whose pictures would be files beside it
             outputs = replace(outputs, maps=())
-        run = Run(source, Path(folder) / "out", options, replace(outputs, preview=False))
+        run = Run(source, Path(folder) / "out", options, replace(outputs, preview=False, report=False))
         code = _perform(run, console, summary=False)
         kind = ",".join(outputs.formats)
         sys.stdout.buffer.write((run.output / f"{source.stem}.{kind}").read_bytes())

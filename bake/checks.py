@@ -78,6 +78,7 @@ def check_outputs(
         endings += ["wrap.onnx"] if outputs.inverse else []
         names += [f"{output.stem}.{ending}" for ending in endings]
         names += [f"{output.stem}.preview.png"] if outputs.preview else []
+        names += [f"{output.stem}.report.html"] if outputs.report else []
     output.check([*names, output.report_name])
     wanted = {
         "baker": bool(maps),

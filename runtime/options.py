@@ -233,6 +233,8 @@ class FileOptions:
     """Also write STEM.wrap.onnx, the network from uv and chart to point and normal."""
     preview: bool | None = None
     """Draw STEM.preview.png; by default where maps are baked."""
+    report: Flag = False
+    """Also write STEM.report.html, which shows the result in a browser, without network; see flexpara report."""
 
     def __post_init__(self) -> None:
         found, known = ", ".join(self.formats), ", ".join(FORMATS)
