@@ -278,7 +278,7 @@ class UnwrapResult:
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import BakeJob, texture_notes, write_outputs, written_notes
+        from .bake.output import BakeJob, texture_notes, write_outputs, write_reports, written_notes
         from .export.assemble import invert
         from .runtime.io.changes import lost, told
         from .runtime.progress import Clock
@@ -309,12 +309,7 @@ class UnwrapResult:
             for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
                 note(fact)
         seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
-        report["seconds"] = {**report["seconds"], **seconds}
-        if outputs.report:
-            from .bake.report.gather import write_result
-
-            write_result(output, self.atlas, self.asset, report)
-        output.write_report(report)
+        write_reports(output, job, {**report, "seconds": {**report["seconds"], **seconds}})
         return output.commit()
 
     def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:

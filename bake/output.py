@@ -78,6 +78,18 @@ def write_outputs(
     return {"textures": texture_facts(job.atlas, baked), "written": written, "polygons_cut": cut}
 
 
+def write_reports(output: OutputFolder, job: BakeJob, report: Mapping[str, Any]) -> None:
+    """STEM.report.json, and STEM.report.html where it is asked for, once all else is written.
+
+    Raises: InputError where the mesh is too large for one page.
+    """
+    if job.outputs.report:
+        from .report.gather import write_result
+
+        write_result(output, job.atlas, job.asset, report)
+    output.write_report(dict(report))
+
+
 def with_tangents(atlas: Atlas, maps: Sequence[BakeMap]) -> Atlas:
     """The atlas as it is written: each vertex in one tangent group where a map is in tangent space."""
     if not any(entry.space.startswith("tangent") for entry in maps):

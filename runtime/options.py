@@ -211,10 +211,7 @@ class MapOptions:
         plain = (self.exr_bits, self.exr_compression) == (MapOptions.exr_bits, MapOptions.exr_compression)
         demand(self.layers or plain, "exr-bits or exr-compression without layers, expected both; add --layers")
         hexadecimal = color is None or re.fullmatch("#[0-9a-fA-F]{6}", color) is not None
-        demand(
-            hexadecimal,
-            f"background is {color!r}, expected a colour as #rrggbb; pass --background #000000",
-        )
+        demand(hexadecimal, f"background is {color!r}, expected a colour as #rrggbb; pass --background #000000")
         both = self.layers and self.target is not None
         demand(not both, f"layers with target {self.target}, expected one of the two; leave the other out")
 

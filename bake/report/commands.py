@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ...runtime.console import Console, Manners
 from ...runtime.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 MARK = b'<meta name="generator" content="flexpara'
 """Stands near the top of every report: such a file may be replaced."""
@@ -29,20 +32,30 @@ def report(
         console: See Console.
     """
     from ...runtime.files import write_whole
-    from .gather import REPORT, results_in
+    from .gather import results_in
     from .page import write_page
 
     if not result:
         raise InputError("RESULT is missing, expected an output folder of unwrap; see flexpara report --help")
     results = results_in(result)
-    main = results[-1].title
+    title = results[-1].title if len(result) == 1 else " · ".join(entry.title for entry in results)
     if output is None:
-        if len(result) > 1 or len(results) > 2 or not (result[0].is_dir() or result[0].name.endswith(REPORT)):
-            found = f"no output for {', '.join(map(str, result))}"
-            raise InputError(f"{found}, expected a file for the comparison; pass for instance -o compare.html")
-        output = (result[0] if result[0].is_dir() else result[0].parent) / f"{main}.report.html"
-    title = main if len(result) == 1 else " · ".join(entry.title for entry in results)
+        output = folder_of(list(result), len(results)) / f"{title}.report.html"
     own = output.is_file() and MARK in output.read_bytes()[:1000]
     written = write_whole(output, lambda path: write_page(results, title, path), force=console.force or own)
     console.show({}, [written])
     return 0
+
+
+def folder_of(named: Sequence[Path], results: int) -> Path:
+    """The output folder of the one result that was named.  results: how many were found, an earlier layout counted.
+
+    Raises: InputError where there are several, or a mesh that lies in no such folder.
+    """
+    from .gather import REPORT
+
+    first = named[0]
+    if len(named) > 1 or results > 2 or not (first.is_dir() or first.name.endswith(REPORT)):
+        found = f"no output for {', '.join(map(str, named))}"
+        raise InputError(f"{found}, expected a file for the comparison; pass for instance -o compare.html")
+    return first if first.is_dir() else first.parent

@@ -128,7 +128,7 @@ def _card() -> str:
 
 
 def _site(name: str) -> str:
-    return (files(__package__) / "site" / name).read_text(encoding="utf-8")
+    return (files(__name__.rpartition(".")[0]) / "site" / name).read_text(encoding="utf-8")
 
 
 def _module(name: str) -> str:
