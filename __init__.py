@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .runtime import aliases as _aliases  # noqa: F401  # `import flexpara.xatlas` is found through it
 from .runtime import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.errors import FlexparaError
+from .runtime.saving import Saving
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,19 +43,8 @@ if TYPE_CHECKING:
     from .train.deploy.gated import GatedExperts
 
 __version__ = "0.1.0"
-__all__ = [
-    "Asset",
-    "Atlas",
-    "FlexparaError",
-    "Options",
-    "Outputs",
-    "PackOptions",
-    "UnwrapResult",
-    "UnwrapSession",
-    "load",
-    "pack",
-    "unwrap",
-]
+__all__ = ["Asset", "Atlas", "FlexparaError", "Options", "Outputs", "PackOptions", "UnwrapPages", "UnwrapResult"]
+__all__ += ["UnwrapSession", "load", "pack", "unwrap", "unwrap_pages"]
 
 _HOME = {
     "Asset": "runtime.mesh",
@@ -96,11 +86,14 @@ def unwrap(
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
     from .runtime.deadline import Deadline
+    from .runtime.io.anyfile import load_any
     from .runtime.io.points.cloud import PointCloud
-    from .runtime.options import Options, from_keywords
+    from .runtime.keywords import from_keywords
+    from .runtime.options import Options, demand
     from .runtime.progress import Clock
 
     options = from_keywords(Options, options, keywords)
+    demand(options.atlas == "scene", f"atlas is {options.atlas} in unwrap, expected scene; call unwrap_pages")
     clock = Clock(progress, Deadline(options.time_budget))
     source = load_any(mesh, options.select)
     if isinstance(source, PointCloud):
@@ -108,20 +101,19 @@ def unwrap(
     return unwrap_asset(source, options, clock)
 
 
-def load_any(source: MeshLike | PointCloud, select: tuple[str, ...] = ()) -> Asset | PointCloud:
-    """A mesh as an Asset, a file without faces as a PointCloud.  select: as for `load`.
+def unwrap_pages(
+    mesh: MeshLike, options: Options | None = None, *, progress: Progress | None = None, **keywords: Any
+) -> UnwrapPages:
+    """Unwrap a mesh onto several atlases: options.atlas says whether each mesh of a scene or each material has one.
 
-    Raises: InputError when it is neither.
+    Args and raises: as `unwrap`; MissingDependencyError where flexpara[bake] is absent.
     """
     from .runtime.io.meshfile import load
-    from .runtime.io.points.cloud import PointCloud
-    from .runtime.io.points.cloudfile import is_cloud, load_cloud
+    from .runtime.keywords import from_keywords
+    from .runtime.options import Options
 
-    if isinstance(source, PointCloud):
-        return source
-    if isinstance(source, str | Path) and is_cloud(Path(source)):
-        return load_cloud(Path(source))
-    return load(source, select)
+    options = from_keywords(Options, options, keywords)
+    return unwrap_asset_pages(load(mesh, options.select), options, progress)
 
 
 def unwrap_asset(
@@ -140,6 +132,18 @@ def unwrap_asset(
     clock, asset = Clock.of(progress), shaded(asset, options.crease_angle)
     trained = train_asset(asset, options, clock, keep)
     return UnwrapResult(asset, assemble(asset, trained, clock, square_of(options)))
+
+
+def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapPages:
+    """The asset's pages, shaded as one mesh, each as `unwrap_asset`.  Raises: as that."""
+    from .runtime.extras import requires
+    from .runtime.io.pages import pages_of
+    from .runtime.io.shading import shaded
+
+    with requires("bake"):
+        from .bake.files.gltfmade import with_document
+    whole = with_document(shaded(asset, options.crease_angle))
+    return UnwrapPages(whole, tuple(unwrap_asset(page, options, progress) for page in pages_of(whole, options.atlas)))
 
 
 def unwrap_cloud(
@@ -164,7 +168,7 @@ def unwrap_cloud(
 
 
 @dataclass(frozen=True, eq=False)
-class UnwrapResult:
+class UnwrapResult(Saving):
     """An unwrapped mesh or point cloud.
 
     asset: the mesh as read and cleaned, with normals, or the triangles laid over the points.  found: what came of it.
@@ -198,11 +202,8 @@ class UnwrapResult:
 
         Raises: InputError for a mesh, whose uv are those of the atlas.
         """
-        from .runtime.errors import InputError
         from .runtime.io.points.cloud import point_uv
 
-        if self.cloud_mesh is None:
-            raise InputError("point_uv of a mesh, expected a point cloud; use result.atlas")
         return point_uv(self.cloud_mesh, self.atlas)
 
     @property
@@ -214,6 +215,11 @@ class UnwrapResult:
     def onnx(self) -> bytes:
         """The bytes of the ONNX file."""
         return self.found.onnx
+
+    @property
+    def reports(self) -> list[dict[str, Any]]:
+        """The report, as `UnwrapPages` has one for each page."""
+        return [self.report]
 
     @property
     def report(self) -> dict[str, Any]:
@@ -239,36 +245,6 @@ class UnwrapResult:
             from .export.tensors import as_tensors
         return as_tensors(self.atlas, device)
 
-    def save(
-        self,
-        folder: str | Path,
-        outputs: Outputs | None = None,
-        *,
-        force: bool = False,
-        progress: Progress | None = None,
-        **keywords: Any,
-    ) -> tuple[Path, ...]:
-        """Write mesh, ONNX file, textures, preview and report, all or none; returns their paths.
-
-        Args:
-            folder: made where it is absent.
-            outputs: what is written, see `flexpara.Outputs`; None: its defaults.
-            force: whether files are overwritten that flexpara did not write.
-            progress: as for `unwrap`.
-            **keywords: fields of `flexpara.Outputs`, in place of those of outputs: maps=("normal",), preview=False, …
-
-        Raises:
-            InputError: an unknown map, format, target or keyword.
-            ForeignFileError: a file is in the way that flexpara did not write, and force is off.
-            MissingDependencyError: the packages of flexpara[bake] are absent.
-        """
-        from .runtime.files import OutputFolder
-        from .runtime.options import Outputs, from_keywords
-
-        outputs = from_keywords(Outputs, outputs, keywords)
-        with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
-            return self.write(output, outputs, progress)
-
     def write(
         self,
         output: OutputFolder,
@@ -278,9 +254,10 @@ class UnwrapResult:
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import BakeJob, texture_notes, write_outputs, write_reports, written_notes
-        from .export.assemble import invert
+        from .bake.output import BakeJob, result_notes, write_outputs, write_reports
+        from .export.assemble import write_networks
         from .runtime.io.changes import lost, told
+        from .runtime.io.points.written import point_files, write_points
         from .runtime.progress import Clock
 
         outputs = outputs.for_asset(self.asset)
@@ -289,39 +266,65 @@ class UnwrapResult:
         check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
         report["changes"] = {**report["changes"], **lost(self.asset, outputs)}
-        networks = {"onnx": self.onnx}
-        if self.found.paper is not None:
-            networks["paper.onnx"] = self.found.paper
-        if outputs.inverse:
-            networks["wrap.onnx"], report["inverse"] = invert(self.asset, self.found, clock)
-        for ending, content in networks.items():
-            output.write(f"{output.stem}.{ending}", lambda path, content=content: path.write_bytes(content))
+        report |= write_networks(output, self.asset, self.found, clock, inverse=outputs.inverse)
         if self.cloud is not None:
-            self._write_points(output, self.cloud)
+            write_points(output, self.cloud, *self.point_uv())
         apart = report["metrics"]["overlap_fraction"] == 0.0
         job = BakeJob.of(self.found.atlas, self.asset, outputs, maps)
         report |= write_outputs(output, job, clock, apart=apart)
         if cut := report.pop("polygons_cut"):
             report["changes"]["polygons_cut"] = cut
         if note is not None:
-            for fact in told({"polygons_cut": cut}):
+            for fact in (*told({"polygons_cut": cut}), *result_notes(report)):
                 note(f"{self.asset.stem}: {fact}")
-            for fact in (*written_notes(report["written"]), *texture_notes(report["textures"])):
-                note(fact)
-        seconds = {name: round(value, 3) for name, value in clock.seconds.items()}
-        write_reports(output, job, {**report, "seconds": {**report["seconds"], **seconds}})
+        write_reports(output, job, {**report, "seconds": {**report["seconds"], **clock.rounded}})
         return output.commit()
 
-    def _write_points(self, output: OutputFolder, cloud: PointCloud) -> None:
-        """The user's points with their uv and chart, as .npz and, in place of the mesh, as .ply."""
-        from .runtime.io.ply.write import write_cloud_ply
-        from .runtime.io.points.cloudfile import write_cloud_npz
 
-        uv, chart = self.point_uv()
-        for name, write in zip(point_files(output.stem), (write_cloud_ply, write_cloud_npz), strict=True):
-            output.write(name, lambda path, write=write: write(path, cloud, uv, chart))
+@dataclass(frozen=True, eq=False)
+class UnwrapPages(Saving):
+    """A mesh unwrapped onto several atlases.
 
+    asset: all of it, with its scene.  pages: one result for each atlas; the stem of its asset tells which.
+    """
 
-def point_files(stem: str) -> tuple[str, str]:
-    """The files that hold the points of a cloud."""
-    return f"{stem}.ply", f"{stem}.npz"
+    asset: Asset
+    pages: tuple[UnwrapResult, ...]
+
+    @property
+    def reports(self) -> list[dict[str, Any]]:
+        """The report of each page."""
+        return [page.report for page in self.pages]
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Changes, and for each page what an `UnwrapResult` reports; ready for JSON."""
+        return {"changes": self.asset.changes, "pages": {page.asset.stem: page.report for page in self.pages}}
+
+    def write(
+        self,
+        output: OutputFolder,
+        outputs: Outputs,
+        progress: Progress | None = None,
+        note: Callable[[str], None] | None = None,
+    ) -> tuple[Path, ...]:
+        """As `save`, into an open OutputFolder."""
+        from .bake.pages import check_pages, page_jobs, page_notes, write_pages
+        from .export.assemble import write_networks
+        from .runtime.progress import Clock
+
+        check_pages(output, outputs, [page.asset for page in self.pages])
+        clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
+        jobs = page_jobs(
+            outputs, [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
+        )
+        for page in self.pages:
+            networks = write_networks(output, page.asset, page.found, clock, inverse=outputs.inverse)
+            report["pages"][page.asset.stem] = {**page.report, **networks}
+        apart = all(entry["metrics"]["overlap_fraction"] == 0.0 for entry in self.reports)
+        report |= write_pages(output, jobs, clock, apart=apart)
+        if note is not None:
+            for fact in page_notes(report):
+                note(fact)
+        output.write_report({**report, "seconds": clock.rounded})
+        return output.commit()

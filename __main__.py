@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
-from . import UnwrapResult, __version__, load, load_any, unwrap_asset, unwrap_cloud
+from . import UnwrapResult, __version__, load, unwrap_asset, unwrap_asset_pages, unwrap_cloud
 from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
 from .bake.repack.commands import pack
@@ -29,7 +29,7 @@ from .runtime.deadline import Deadline, interrupts_ask
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.inputs import STREAM, from_stdin, meshes_of
-from .runtime.options import AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
+from .runtime.options import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
 from .runtime.progress import Clock
 from .runtime.runfile import Run
 
@@ -147,6 +147,7 @@ def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
 def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
+    from .runtime.io.anyfile import load_any
     from .runtime.io.changes import lost
     from .runtime.mesh import Asset
 
@@ -159,22 +160,29 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
                 outputs = run.outputs.for_asset(source)
                 console.note_changes(source, lost(source, outputs))
                 check_outputs(folder, outputs, chosen_maps(outputs))
+                if run.options.atlas != SHARINGS[0]:
+                    outputs.for_pages()
             run.save()
             clock, ending = Clock(progress, deadline), nullcontext()
             if run.options.preset == "fast":  # preset paper has checkpoints
                 ending = interrupts_ask(deadline, console.note)
             with ending:
-                if isinstance(source, Asset):
+                if not isinstance(source, Asset):
+                    result = unwrap_cloud(source, run.options, clock, run.keep)
+                elif run.options.atlas == SHARINGS[0]:
                     result = unwrap_asset(source, run.options, clock, run.keep)
                 else:
-                    result = unwrap_cloud(source, run.options, clock, run.keep)
+                    result = unwrap_asset_pages(source, run.options, clock)
             written = result.write(folder, run.outputs, progress, console.note)
-    if result.cloud is not None:
+    if not isinstance(source, Asset):
         console.note_changes(result.asset)
-    console.notes(result.report["train"])
     run.forget()
-    if summary:
-        console.show({**result.report["metrics"], **result.report["network"]}, written)
+    for facts in result.reports:
+        console.notes(facts["train"])
+        if summary:
+            page = {"page": facts["source"]["stem"]} if len(result.reports) > 1 else {}
+            console.show({**page, **facts["metrics"], **facts["network"]}, ())
+    console.show({}, written if summary else ())
     return 0
 
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..runtime.extras import requires
 from ..runtime.io.gltf.instances import every_instance
 from ..runtime.io.loops import loops_of
@@ -17,7 +19,7 @@ from ..runtime.material import used_materials
 from ..runtime.options import SCENES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from ..runtime.files import OutputFolder
@@ -80,6 +82,24 @@ def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> 
     }
 
 
+def write_scenes(output: OutputFolder, jobs: Sequence[MeshJob], *, apart: bool = False) -> dict[str, dict[str, Any]]:
+    """The scene that all jobs are pages of, in each format asked for; what was read back, as `write_meshes`."""
+    from .files.written import Reading, parts_of, written_report
+
+    formats, uv_set = jobs[0].outputs.formats, jobs[0].outputs.uv_set
+    staged: dict[str, Path] = {}
+
+    def write(kind: str, path: Path) -> None:
+        _write_scene(jobs, path)
+        staged[kind] = path
+
+    for kind in formats:
+        output.write(f"{output.stem}.{kind}", partial(write, kind))
+    found = [(job.atlas.uv[job.atlas.faces], *parts_of(job.asset, uv_set or 0)) for job in jobs]
+    reading = Reading(apart=apart, parts=[part for _, _, parts in found for part in parts])
+    return written_report(staged, np.concatenate([uv[order] for uv, order, _ in found]), reading)
+
+
 def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
     """With a document for what is written as one: several materials, or uv that go beside others."""
     wanted = outputs.uv_set is not None or len(used_materials(asset)) > 1
@@ -92,13 +112,19 @@ def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
 
 def _write_gltf(job: MeshJob, path: Path) -> None:
     """A .glb or .gltf file: the document with new uv, where there is one."""
+    if job.asset.document is not None:
+        _write_scene([job], path)
+        return
     with requires("bake"):
         from .files.gltf import write_glb
+    write_glb(job.atlas, job.asset, job.textures, path)
+
+
+def _write_scene(jobs: Sequence[MeshJob], path: Path) -> None:
+    """The document of all jobs, each of which is a page of it."""
+    with requires("bake"):
         from .files.gltfscene import Page, write_scene
-    if job.asset.document is None:
-        write_glb(job.atlas, job.asset, job.textures, path)
-    else:
-        write_scene([Page(job.atlas, job.asset, job.textures, job.outputs.uv_set)], path)
+    write_scene([Page(job.atlas, job.asset, job.textures, job.outputs.uv_set) for job in jobs], path)
 
 
 def _write_obj(job: MeshJob, path: Path) -> None:

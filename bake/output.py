@@ -72,7 +72,7 @@ def write_outputs(
             written |= {f"{named}{kind}": facts for kind, facts in write_meshes(output, files, apart=apart).items()}
     if job.outputs.preview:
         with clock.stage("preview"):
-            _write_preview(output, job.atlas, job.asset)
+            write_preview(output, job.atlas, job.asset)
     with_polygons = [piece for piece in pieces or [job] if set(POLYGONS) & set(piece.outputs.formats)]
     cut = sum(loops_of(piece.atlas, piece.asset).cut for piece in with_polygons)
     return {"textures": texture_facts(job.atlas, baked), "written": written, "polygons_cut": cut}
@@ -127,7 +127,7 @@ def gutter_of(atlas: Atlas, outputs: Outputs) -> int | None:
 
 def _write_files(output: OutputFolder, textures: dict[str, Texture], asset: Asset, outputs: Outputs) -> dict[str, str]:
     """Texture files by product: those of the target, one EXR with layers, or one a map."""
-    stem, found = output.stem, {}
+    stem, found = asset.stem, {}
     if outputs.layers:
         from .files.exr import file_metadata, write_layers
 
@@ -187,6 +187,11 @@ def written_notes(written: Mapping[str, Mapping[str, Any]]) -> list[str]:
     ]
 
 
+def result_notes(report: Mapping[str, Any]) -> list[str]:
+    """What a user should know of what was written: a line each."""
+    return [*written_notes(report["written"]), *texture_notes(report["textures"])]
+
+
 def texture_notes(facts: Mapping[str, Any]) -> list[str]:
     """What a user should know of the textures: a line for each map that is the same all over."""
     return [
@@ -203,12 +208,12 @@ def bleeding(atlas: Atlas, size: int, padding: int | None) -> int:
     return clean_mip(chart_labels(atlas, size, padding), atlas)
 
 
-def _write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
+def write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:
     """The preview; without OpenGL a warning in its place."""
     from .pictures.preview import render_preview
     from .raster.plan import SoftwareWarning
 
     try:
-        output.write(f"{output.stem}.preview.png", lambda path: render_preview(atlas, asset, path))
+        output.write(f"{asset.stem}.preview.png", lambda path: render_preview(atlas, asset, path))
     except MissingDependencyError as error:
         warnings.warn(f"no preview is drawn, since {error}", SoftwareWarning, stacklevel=2)

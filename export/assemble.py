@@ -30,6 +30,7 @@ from .onnxfile import export_networks
 if TYPE_CHECKING:
     from torch import nn
 
+    from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.progress import Clock
     from ..train.deploy.gated import GatedExperts
@@ -86,7 +87,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
         onnx = path.read_bytes()
         paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, size, facts)
     report |= {"parity": asdict(parity), "network": network.to_dict()}
-    report["seconds"] = {stage: round(seconds, 3) for stage, seconds in clock.seconds.items()}
+    report["seconds"] = clock.rounded
     return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
 
 
@@ -150,6 +151,23 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
         export_wrap(model, PlacedCharts(found.frame, found.atlas, found.charts), path, metadata=facts)
         agreed = inverse_agreement(WrapSession(path), asset.surface, found.atlas)
         return path.read_bytes(), agreed.to_dict()
+
+
+def write_networks(
+    output: OutputFolder, asset: Asset, found: Unwrapped, clock: Clock, *, inverse: bool
+) -> dict[str, Any]:
+    """Write the ONNX files of an unwrapped mesh; what the report says of them beyond that of `found`.
+
+    inverse: whether its inverse is one of them.  Raises: as `invert`.
+    """
+    files, facts = {"onnx": found.onnx}, dict[str, Any]()
+    if found.paper is not None:
+        files["paper.onnx"] = found.paper
+    if inverse:
+        files["wrap.onnx"], facts["inverse"] = invert(asset, found, clock)
+    for ending, content in files.items():
+        output.write(f"{asset.stem}.{ending}", lambda path, content=content: path.write_bytes(content))
+    return facts
 
 
 def _paper_file(model: nn.Module, asset: Asset, frame: Frame, size: int, facts: Provenance) -> bytes:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .progress import Progress
 
 SUMMARY = {
+    "page": "{}",
     "charts": "{}",
     "symmetric_dirichlet_mean": "{:.4f}",
     "isometric_mean": "{:.5f}",

@@ -107,7 +107,8 @@ class Asset:
     but a mesh.  part: (f,) int64, the part of it that each face is in; origin: (n,) int64, the vertex of that part that
     each file vertex is; both None without a document.  polygons: what the triangles were, None for a format of
     triangles.  obj: the text of an OBJ file.  smoothing: (f,) int64, the smoothing group of each face, 0 for a flat
-    one; None where the file doesn't say.  unsplit: (n,) int64, the vertex that each was before normals split some.
+    one; None where the file doesn't say.  unsplit: (n,) int64, the file's vertex that each is, where normals split
+    some or the asset is a page of another.  whole: of a page, the surface of all pages together, which rays meet.
     """
 
     positions: NDArray[np.float64]
@@ -129,6 +130,7 @@ class Asset:
     obj: ObjText | None = None
     smoothing: NDArray[np.int64] | None = None
     unsplit: NDArray[np.int64] | None = None
+    whole: Surface | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,29 +1,26 @@
 """What a user may ask for: one frozen dataclass for each concern, taken by the command line and by the Python API.
 
 A field is an option: its name, default and type stand here, and the text under it is its help.  Commands take these
-classes as they are (cyclopts flattens them); the API makes them of keywords with `from_keywords`.  So a new option is
+classes as they are (cyclopts flattens them); the API makes them of keywords (keywords.py).  So a new option is
 one field here and its use.  Values are checked when an object is made.  Sizes and paddings are in texels.
 
 Annotations are evaluated here, unlike in other modules: cyclopts reads those of fields that other classes inherit.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
-from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from .errors import InputError
-from .words import Flag, Names, names
+from .words import Flag, Names
 
 if TYPE_CHECKING:
     from .mesh import Asset
 
-Chosen = TypeVar("Chosen")
 SIZES = (16, 16384)
 PRESETS = ("fast", "paper")
 MODES = ("multi-chart", "global")
@@ -31,6 +28,7 @@ PRECISIONS = ("float32", "bfloat16")
 ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirectional", "chart-differential")
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "gltf", "obj", "ply", "usda", "npz")
+SHARINGS = ("scene", "mesh", "material")
 SCENES = ("glb", "gltf")
 """Formats that hold scenes."""
 POLYGONS = ("obj", "ply", "usda")
@@ -169,9 +167,16 @@ class Options(AtlasOptions, TrainOptions):
     Raises: InputError for a value outside what its field allows.
     """
 
+    atlas: Literal["scene", "mesh", "material"] = "scene"
+    """What shares an atlas: all of a scene, or each mesh or material has one with textures and an ONNX file of its
+    own."""
+
     def __post_init__(self) -> None:
         TrainOptions.__post_init__(self)
         AtlasOptions.__post_init__(self)
+        demand_known("atlas", self.atlas, SHARINGS)
+        single = self.atlas == SHARINGS[0] or self.preset == "fast"
+        demand(single, f"atlas is {self.atlas} with preset paper, expected scene; leave --atlas out")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -270,6 +275,13 @@ class Outputs(FileOptions, MapOptions):
         drawn = bool(self.maps) if self.preview is None else self.preview
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
 
+    def for_pages(self) -> None:
+        """Raises: InputError for what a mesh with several atlases can't be written as."""
+        found, fits = ", ".join(self.formats), set(self.formats) <= set(SCENES)
+        demand(fits, f"several atlases with format {found}, expected glb or gltf; leave --atlas or --format out")
+        demand(not self.layers, "several atlases with layers, expected one of the two; leave the other out")
+        demand(not self.report, "several atlases with report, expected one of the two; leave the other out")
+
     def for_points(self) -> "Outputs":
         """The same without the triangles as ply or npz, whose names the points have; glb where that leaves none."""
         left = tuple(name for name in self.formats if name not in ("ply", "npz"))
@@ -285,36 +297,6 @@ class CheckpointOptions:
     resume: Path | None = None
     """The output folder of a run with checkpoints that was cut short.  It goes on with its own mesh and options, so
     nothing else may be given."""
-
-
-def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str, Any]) -> Chosen:
-    """Options as the Python API takes them: an object made before, keywords, or both, where keywords replace fields.
-
-    A field of several names takes any sequence of them, or one comma-separated word.
-
-    Raises: InputError for an unknown keyword, or a value that its field refuses.
-    """
-    start: Any = kind() if made is None else made
-    known = {field.name: field.default for field in fields(start)}
-    for name in keywords:
-        close = get_close_matches(name, known, 1)
-        remedy = f"pass {close[0]}" if close else "leave it out"
-        demand(name in known, f"{name} is no option, expected some of {', '.join(sorted(known))}; {remedy}")
-    try:
-        return replace(start, **{name: _as_field(name, known[name], value) for name, value in keywords.items()})
-    except TypeError as error:
-        raise InputError(f"an option has the wrong type ({error}), expected those of {kind.__name__}") from error
-
-
-def _as_field(name: str, default: object, value: Any) -> Any:
-    """The value as the field holds it: integers of numpy as int or float, several names as a tuple."""
-    if isinstance(default, tuple):
-        return names(value) if isinstance(value, str) else tuple(value)
-    plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
-    plain = float(plain) if type(plain) is int and isinstance(default, float) else plain
-    fits = default is None or type(plain) is type(default)
-    demand(fits, f"{name} is {value!r}, expected a value like {default!r}; pass one of type {type(default).__name__}")
-    return plain
 
 
 def demand_known(name: str, value: str, known: Sequence[str]) -> None:

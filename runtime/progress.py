@@ -43,6 +43,11 @@ class Clock:
         if self._progress is not None:
             self._progress(stage, step, steps, loss)
 
+    @property
+    def rounded(self) -> dict[str, float]:
+        """Seconds of each stage to the millisecond, for reports."""
+        return {stage: round(seconds, 3) for stage, seconds in self.seconds.items()}
+
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Around a stage of one step."""

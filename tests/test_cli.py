@@ -204,7 +204,7 @@ def test_unwrap_writes_every_file_and_says_what_came_out(
     out = tmp_path / "out"
     assert main(["unwrap", str(square), "-o", str(out), "--size", "64", "--maps", "auto,chart"]) == 0
     printed = capsys.readouterr()
-    assert printed.err.startswith("flexpara: note: the map chart is the same all over (")
+    assert printed.err.startswith("flexpara: note: square: the map chart is the same all over (")
     assert printed.err.count("\n") == 1
     pictures = {"square_chart.png"}
     expected = {"square.glb", "square.onnx", "square.report.json", "square.preview.png"} | pictures

@@ -132,3 +132,50 @@ def test_what_is_not_selected_comes_back_as_it_was(
     assert board != arm
     assert main([*argv, "Leg"]) == 2
     assert "no node and no mesh is called 'Leg'" in capsys.readouterr().err
+
+
+def shown(tree: dict[str, Any], mesh: int, primitive: int) -> tuple[str, str, int]:
+    """Material, name of its occlusion picture, and the uv set that this is read with."""
+    material = tree["materials"][tree["meshes"][mesh]["primitives"][primitive]["material"]]
+    info = material["occlusionTexture"]
+    picture = tree["images"][tree["textures"][info["index"]]["source"]]
+    return material["name"], picture["name"], info.get("texCoord", 0)
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_each_mesh_can_have_an_atlas_with_textures_of_its_own(scene: Path, tmp_path: Path) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--atlas", "mesh", "--maps", "ao", "--size", "64"]
+    assert main([*argv, "--no-preview", "--quiet"]) == 0
+    tree = tree_of(tmp_path / "out" / "scene.glb")
+    assert shown(tree, 0, 0) == ("Paint", "scene_Board_ao", 0)
+    assert shown(tree, 0, 1) == ("Glass", "scene_Board_ao", 0)
+    assert shown(tree, 1, 0) == ("Paint", "scene_Arm_ao", 0)
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    pages = {f"scene_{page}{ending}" for page in ("Board", "Arm") for ending in (".onnx", "_ao.png")}
+    assert names == pages | {"scene.glb", "scene.report.json"}
+    report = json.loads((tmp_path / "out" / "scene.report.json").read_text(encoding="utf-8"))
+    assert set(report["pages"]) == {"scene_Board", "scene_Arm"}
+    assert report["written"]["glb"] == {"faces": 14, "flipped": 0, "overlapping": 0, "read_back": True}
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_each_material_can_have_an_atlas_and_all_else_stays(scene: Path, tmp_path: Path) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--atlas", "material", "--maps", "ao", "--size", "64"]
+    assert main([*argv, "--no-preview", "--quiet"]) == 0
+    before, after = (tree_of(path) for path in (scene, tmp_path / "out" / "scene.glb"))
+    assert [shown(after, *place)[1] for place in ((0, 0), (0, 1), (1, 0))] == [
+        "scene_Paint_ao",
+        "scene_Glass_ao",
+        "scene_Paint_ao",
+    ]
+    for name in ("nodes", "scenes", "cameras", "extensions"):
+        assert after[name] == before[name]
+
+
+def test_several_atlases_want_a_format_that_holds_them(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], instant_training: list[object]
+) -> None:
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--atlas", "mesh", "--format", "obj"]
+    assert main(argv) == 2
+    assert "several atlases with format obj, expected glb or gltf" in capsys.readouterr().err
+    assert instant_training == []

@@ -79,7 +79,7 @@ def scene_tree(pages: list[Page]) -> tuple[dict[str, Any], bytes]:
     editing = Editing(document.file)
     slices = [(page, piece) for page in pages for piece in slices_of(page, document)]
     materials = Materials(editing, _kept(editing.tree, [piece.part for _, piece in slices]))
-    baked = {id(page): _embedded(editing, page, f"page {number}") for number, page in enumerate(pages)}
+    baked = {id(page): _embedded(editing, page, page.asset.stem if len(pages) > 1 else "") for page in pages}
     for page, piece in slices:
         _rewrite(editing, materials, page, piece, baked[id(page)])
     editing.tree["asset"]["generator"] = f"flexpara {__version__}"
@@ -121,8 +121,11 @@ def _kept(tree: dict[str, Any], parts: list[Part]) -> frozenset[int]:
     )
 
 
-def _embedded(editing: Editing, page: Page, name: str) -> Baked:
-    """The textures of an atlas, embedded as 8-bit PNG with one sampler: trilinear, clamped to the edge."""
+def _embedded(editing: Editing, page: Page, atlas: str) -> Baked:
+    """The textures of an atlas, embedded as 8-bit PNG with one sampler: trilinear, clamped to the edge.
+
+    atlas: name of the atlas among several, "" for a single one.
+    """
     shown = {name: page.textures[name] for name in SHOWN if name in page.textures}
     if page.uv_set is not None:
         shown = {name: shown[name] for name in SHADOWS if name in shown}
@@ -132,10 +135,10 @@ def _embedded(editing: Editing, page: Page, name: str) -> Baked:
         number = editing.add("samplers", sampler)
         for name, texture in shown.items():
             green = with_green(texture, "opengl") if name == "normal" else texture
-            numbers[name] = editing.add_picture(name, encode_png(green, bits=8), number)
+            numbers[name] = editing.add_picture(f"{atlas}_{name}".lstrip("_"), encode_png(green, bits=8), number)
     if page.uv_set is not None:
-        return Baked(name, numbers, coordinates=page.uv_set, moved=0)
-    return Baked(name, numbers, strength=emissive_strength(page.asset) if "emissive" in numbers else 1.0)
+        return Baked(atlas, numbers, coordinates=page.uv_set, moved=0)
+    return Baked(atlas, numbers, strength=emissive_strength(page.asset) if "emissive" in numbers else 1.0)
 
 
 def _rewrite(editing: Editing, materials: Materials, page: Page, piece: Slice, baked: Baked) -> None:

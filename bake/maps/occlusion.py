@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.geometry.triangles import triangle_cross
-from ...runtime.mesh import Frame
 from .normals import in_tangent_space
 from .rays import BATCH, RayScene, RaySettings, cosine_directions, in_batches, pattern_of, sphere_patterns
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...runtime.mesh import Asset, Atlas
+    from ...runtime.mesh import Asset, Atlas, Frame, Surface
     from ..bakemap import Compute, NormalFormat
     from ..raster.gbuffer import GBuffer
 
@@ -74,14 +73,14 @@ def ambient_occlusion(
     where it is at hand.
     """
     settings = settings or RaySettings()
-    reach = settings.distance / Frame.of(asset.surface.vertices).scale
+    scene = scene or RayScene.of(met_by_rays(asset))
+    reach = settings.distance / scene.frame.scale
 
     def open_part(scene: RayScene, origin: NDArray[np.float32], direction: NDArray[np.float32], _: object) -> NDArray:
         blocked = scene.occluded(_per_ray(origin, direction), direction.reshape(-1, 3), _reach(direction, reach))
         count = direction.shape[1]
         return (1.0 - np.count_nonzero(blocked.reshape(-1, count), axis=1)[:, None] / count).astype(np.float32)
 
-    scene = scene or RayScene.of(asset.surface)
     return _gather(gbuffer, atlas, asset, settings, scene, Estimate(open_part, 1))
 
 
@@ -93,7 +92,8 @@ def bent_normals(
     The normal itself where no ray is open.
     """
     settings = settings or RaySettings()
-    reach = settings.distance / Frame.of(asset.surface.vertices).scale
+    scene = scene or RayScene.of(met_by_rays(asset))
+    reach = settings.distance / scene.frame.scale
 
     def mean_open(
         scene: RayScene, origin: NDArray[np.float32], direction: NDArray[np.float32], normal: NDArray[np.float32]
@@ -103,7 +103,6 @@ def bent_normals(
         total = np.einsum("ts,tsi->ti", weight.astype(np.float32), direction)
         return _unit_or(total, normal)
 
-    scene = scene or RayScene.of(asset.surface)
     return _gather(gbuffer, atlas, asset, settings, scene, Estimate(mean_open, 3))
 
 
@@ -117,7 +116,8 @@ def thickness(
     (what is deeper is shown as 1).  Rays that leave through a hole do not count, and where all do the thickness is 0.
     """
     settings = settings or RaySettings()
-    reach = settings.distance / Frame.of(asset.surface.vertices).scale
+    scene = scene or RayScene.of(met_by_rays(asset))
+    reach = settings.distance / scene.frame.scale
 
     def mean_depth(
         scene: RayScene, origin: NDArray[np.float32], direction: NDArray[np.float32], normal: NDArray[np.float32]
@@ -128,8 +128,12 @@ def thickness(
         count = np.count_nonzero(hits.hit.reshape(along.shape), axis=1)
         return np.minimum(depth.sum(axis=1) / np.maximum(count, 1), 1.0)[:, None].astype(np.float32)
 
-    scene = scene or RayScene.of(asset.surface)
     return _gather(gbuffer, atlas, asset, settings, scene, Estimate(mean_depth, 1, inwards=True))
+
+
+def met_by_rays(asset: Asset) -> Surface:
+    """The surface that rays meet: of a page, that of all pages."""
+    return asset.surface if asset.whole is None else asset.whole
 
 
 def starting_points(
@@ -168,10 +172,10 @@ def lift(
 
 def _with_scene(function: Callable[..., NDArray[np.float32]], settings: RaySettings) -> Compute:
     """The function with its settings, and a scene that is kept while the surface stays the same."""
-    scene_of = lru_cache(maxsize=1)(RayScene.of)
+    made = lru_cache(maxsize=1)(RayScene.of)
 
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-        return function(gbuffer, atlas, asset, settings, scene=scene_of(asset.surface))
+        return function(gbuffer, atlas, asset, settings, scene=made(met_by_rays(asset)))
 
     return compute
 

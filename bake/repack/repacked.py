@@ -11,7 +11,7 @@ import numpy as np
 from ... import __version__
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
-from ...runtime.options import from_keywords
+from ...runtime.keywords import from_keywords
 from ...runtime.pack.density import square_of
 from ...runtime.pack.repack import repack
 from ...runtime.packoptions import PackOptions, PackOutputs
@@ -107,7 +107,7 @@ class PackResult:
         report["changes"] = {**report["changes"], **(cut if any(cut.values()) else {})}
         for fact in (*told(cut), *texture_notes(report["textures"])):
             note(f"{self.asset.stem}: {fact}")
-        output.write_report({**report, "seconds": {name: round(value, 3) for name, value in clock.seconds.items()}})
+        output.write_report({**report, "seconds": clock.rounded})
         return output.commit()
 
 

@@ -71,5 +71,5 @@ def with_corner_normals(asset: Asset, normals: NDArray[np.float64]) -> Asset:
 
 
 def with_file_vertices(atlas: Atlas, asset: Asset) -> Atlas:
-    """The atlas with source_vertex into the vertices as the file has them; those are the first of the asset's."""
+    """The atlas with source_vertex into the vertices as the file has them, which are the first of a whole asset's."""
     return atlas if asset.unsplit is None else replace(atlas, source_vertex=asset.unsplit[atlas.source_vertex])

@@ -122,11 +122,15 @@ def distinct_points(cloud: PointCloud) -> DistinctPoints:
     return DistinctPoints(cloud.points[first], normals, first, weld)
 
 
-def point_uv(mesh: CloudMesh, atlas: Atlas) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def point_uv(mesh: CloudMesh | None, atlas: Atlas) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Where the user's points lie in an atlas: uv (n, 2) float32 in [0, 1], v up, and chart (n,) int64.
 
     A point on a seam has several; it gets those of the largest face around it.
+
+    Raises: InputError where there are no points.
     """
+    if mesh is None:
+        raise InputError("point_uv of a mesh, expected a point cloud; use result.atlas")
     corner = atlas.corner_uv[mesh.point_face]
     uv = np.einsum("ni,nic->nc", mesh.point_weight, corner)
     return np.clip(uv, 0.0, 1.0).astype(np.float32), atlas.face_chart[mesh.point_face]

@@ -263,3 +263,13 @@ def test_bunny_is_darker_in_its_creases_than_outside(bunny: Scene) -> None:
     cosine = np.einsum("ti,ti->t", bent, covered(buffer, buffer.normal))
     assert cosine[occlusion > 0.99].min() > 0.97
     assert cosine[occlusion < 0.7].mean() < 0.98
+
+
+def test_rays_of_a_page_meet_the_other_pages() -> None:
+    both = scene_of(quads(FLOOR, WALL))
+    atlas, floor = scene_of(quads(FLOOR))
+    alone = ambient_occlusion(floor_point((atlas, floor), 1.0), atlas, floor)
+    page = ambient_occlusion(floor_point((atlas, floor), 1.0), atlas, replace(floor, whole=both[1].surface))
+    whole = ambient_occlusion(floor_point(both, 1.0), *both)
+    assert alone[0, 0, 0] == 1.0
+    assert page[0, 0, 0] == whole[0, 0, 0] < 0.8

@@ -1,0 +1,47 @@
+"""Options as the Python API takes them: an object made before, keywords, or both."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from difflib import get_close_matches
+from numbers import Integral
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from .errors import InputError
+from .options import demand
+from .words import names
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Chosen = TypeVar("Chosen")
+
+
+def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str, Any]) -> Chosen:
+    """Options of that kind; keywords replace fields of those made before.
+
+    A field of several names takes any sequence of them, or one comma-separated word.
+
+    Raises: InputError for an unknown keyword, or a value that its field refuses.
+    """
+    start: Any = kind() if made is None else made
+    known = {field.name: field.default for field in fields(start)}
+    for name in keywords:
+        close = get_close_matches(name, known, 1)
+        remedy = f"pass {close[0]}" if close else "leave it out"
+        demand(name in known, f"{name} is no option, expected some of {', '.join(sorted(known))}; {remedy}")
+    try:
+        return replace(start, **{name: _as_field(name, known[name], value) for name, value in keywords.items()})
+    except TypeError as error:
+        raise InputError(f"an option has the wrong type ({error}), expected those of {kind.__name__}") from error
+
+
+def _as_field(name: str, default: object, value: Any) -> Any:
+    """The value as the field holds it: integers of numpy as int or float, several names as a tuple."""
+    if isinstance(default, tuple):
+        return names(value) if isinstance(value, str) else tuple(value)
+    plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+    plain = float(plain) if type(plain) is int and isinstance(default, float) else plain
+    fits = default is None or type(plain) is type(default)
+    demand(fits, f"{name} is {value!r}, expected a value like {default!r}; pass one of type {type(default).__name__}")
+    return plain

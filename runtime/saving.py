@@ -1,0 +1,62 @@
+"""Results that are written as files: the ways into an output folder that all of them share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .files import OutputFolder
+    from .mesh import Asset
+    from .options import Outputs
+    from .progress import Progress
+
+
+class Saving(ABC):
+    """What an unwrap gives back.   asset: whose stem the files have."""
+
+    asset: Asset
+
+    def save(
+        self,
+        folder: str | Path,
+        outputs: Outputs | None = None,
+        *,
+        force: bool = False,
+        progress: Progress | None = None,
+        **keywords: Any,
+    ) -> tuple[Path, ...]:
+        """Write mesh, ONNX file, textures, preview and report, all or none; returns their paths.
+
+        Args:
+            folder: made where it is absent.
+            outputs: what is written, see `flexpara.Outputs`; None: its defaults.
+            force: whether files are overwritten that flexpara did not write.
+            progress: as for `unwrap`.
+            **keywords: fields of `flexpara.Outputs`, in place of those of outputs: maps=("normal",), preview=False, …
+
+        Raises:
+            InputError: an unknown map, format, target or keyword.
+            ForeignFileError: a file is in the way that flexpara did not write, and force is off.
+            MissingDependencyError: the packages of flexpara[bake] are absent.
+        """
+        from .files import OutputFolder
+        from .keywords import from_keywords
+        from .options import Outputs
+
+        outputs = from_keywords(Outputs, outputs, keywords)
+        with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
+            return self.write(output, outputs, progress)
+
+    @abstractmethod
+    def write(
+        self,
+        output: OutputFolder,
+        outputs: Outputs,
+        progress: Progress | None = None,
+        note: Callable[[str], None] | None = None,
+    ) -> tuple[Path, ...]:
+        """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
