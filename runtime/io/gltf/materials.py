@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from ...errors import MeshError, MissingDependencyError
 from ...material import SLOTS, UNTURNED, Material, Picture
+from ..ktx2 import decode_ktx2
 from ..pictures import decode_image
 from ..text import finite
 from .buffers import GltfFile, buffer_view, read_resource
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 TRANSFORM = "KHR_texture_transform"
 WEBP = "EXT_texture_webp"
+BASIS = "KHR_texture_basisu"
+KTX2 = b"\xabKTX 20\xbb\r\n\x1a\n"
+"""First bytes of such a file."""
 STRENGTH = "KHR_materials_emissive_strength"
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
@@ -122,17 +127,21 @@ def _unit(value: Any) -> float:
 def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | str:
     """The picture of a textureInfo, decoded once, or why none can be had."""
     texture = file.tree["textures"][info["index"]]
-    sources = [holder["source"] for holder in (texture, *_webp(texture)) if "source" in holder]
-    if not sources:
-        names = ", ".join(texture.get("extensions", {})) or "no extension"
-        return f"has its picture in {names}, which is not read"
-    if sources[0] not in known:
-        known[sources[0]] = decode_image(image_bytes(file, sources[0]))
-    return known[sources[0]]
-
-
-def _webp(texture: dict[str, Any]) -> list[dict[str, Any]]:
-    return [texture["extensions"][WEBP]] if WEBP in texture.get("extensions", {}) else []
+    extensions = texture.get("extensions", {})
+    holders = (texture, *(extensions[name] for name in (WEBP, BASIS) if name in extensions))
+    source = next((holder["source"] for holder in holders if "source" in holder), None)
+    if source is None:
+        return f"has its picture in {', '.join(extensions) or 'no extension'}, which is not read"
+    if source not in known:
+        data = image_bytes(file, source)
+        if not data.startswith(KTX2) and source != extensions.get(BASIS, {}).get("source"):
+            known[source] = decode_image(data)
+        else:
+            try:
+                known[source] = decode_ktx2(data)
+            except (MissingDependencyError, MeshError) as error:
+                return f"is a KTX 2 picture that can't be decoded ({error})"
+    return known[source]
 
 
 def image_bytes(file: GltfFile, index: int) -> bytes:

@@ -1,0 +1,36 @@
+"""KTX 2 pictures of Basis Universal (ETC1S, UASTC), as KHR_texture_basisu asks for them → pixels.   h w texels.
+
+Decoded by opengl_basisu, which holds Binomial's own transcoder and comes with flexpara[formats].
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import MeshError
+from ..extras import requires
+from .pictures import MAX_PIXELS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def decode_ktx2(data: bytes) -> NDArray[np.uint8]:
+    """The largest level of a KTX 2 file: (h, w, 4) uint8 as stored, row 0 = top.
+
+    Raises:
+        MeshError: damaged, not of Basis Universal, of high dynamic range, or of more than MAX_PIXELS pixels.
+        MissingDependencyError: flexpara[formats] is absent.
+    """
+    with requires("formats"):
+        import opengl_basisu
+
+    try:
+        texture = opengl_basisu.open(data)
+        if texture.width * texture.height > MAX_PIXELS:
+            raise MeshError(f"{texture.width} × {texture.height} pixels, at most {MAX_PIXELS} are read; scale it down")
+        return np.ascontiguousarray(texture.transcode(opengl_basisu.Target.RGBA8).data, dtype=np.uint8)
+    except opengl_basisu.BasisuError as error:
+        raise MeshError(f"{error}, expected KTX 2 of Basis Universal with 8 bits; encode it again") from error
