@@ -41,6 +41,7 @@ def evaluate(
     mesh: Path,
     *,
     size: int | None = None,
+    faces: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
 ) -> int:
     """Measure a mesh that has uv, whoever made them.
@@ -48,12 +49,16 @@ def evaluate(
     Args:
         mesh: A mesh with uv.
         size: Side of the atlas in texels, which texel density and bleeding are measured for.
+        faces: Also write an npz file with what is true of each triangle: charts, distortion (mean symmetric Dirichlet
+            energy, 1 is isometric), and polygons, which of the file's polygons it is of.
         as_json: Print JSON.
     """
     if size is not None:
         AtlasOptions(size=size)
+    from .files import write_whole
     from .geometry.metrics import measure
     from .io.meshfile import load
+    from .io.npz import write_faces
 
     asset = load(mesh)
     if asset.uv is None:
@@ -61,6 +66,8 @@ def evaluate(
             f"{mesh} has no uv, expected a mesh that carries them; make some: flexpara unwrap {mesh} -o out/"
         )
     metrics = measure(asset.surface, asset.uv[asset.faces], size=size).to_dict()
+    if faces is not None:
+        write_whole(faces, lambda path: write_faces(path, asset))
     if as_json:
         sys.stdout.write(json.dumps(metrics, indent=2) + "\n")
     else:

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from .errors import InputError
 from .extras import PACKAGE
 from .options import Flag
-from .progress import progress_bars
+from .progress import progress_bars, progress_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +43,8 @@ SUMMARY = {
 class Console:
     """How a command behaves towards the user and the files that lie there."""
 
+    progress_lines: Flag = False
+    """Print progress as lines "flexpara: progress: STAGE STEP/STEPS" on stderr, for programs, in place of bars."""
     quiet: Flag = False
     """Print neither progress nor notes nor a summary; errors are still printed."""
     force: Flag = False
@@ -99,7 +101,7 @@ class Console:
                     shown(message, category, *place, **more)
 
             warnings.showwarning = show_warning
-            yield progress
+            yield progress_lines if self.progress_lines else progress
 
 
 Manners = Annotated[Console, Parameter(name="*")]

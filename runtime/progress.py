@@ -73,6 +73,13 @@ class Stages:
         self._progress(name, 0, 1)
 
 
+def progress_lines(stage: str, step: int, steps: int, loss: float | None = None) -> None:
+    """A Progress for programs: a line `flexpara: progress: STAGE STEP/STEPS` on stderr for each call."""
+    del loss
+    sys.stderr.write(f"flexpara: progress: {stage} {step}/{steps}\n")
+    sys.stderr.flush()
+
+
 @contextmanager
 def progress_bars(*, quiet: bool = False) -> Iterator[Progress | None]:
     """Bars on stderr, one a stage, with loss and time left; None when quiet or when stderr is no terminal."""

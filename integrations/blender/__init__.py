@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""flexpara in Blender: unwrap, repack, evaluate and bake from the UV menu, the work done by a process beside Blender.
+
+`exchange` (arrays and files) and `child` (the process) know nothing of Blender; `meshes` reads and writes its data,
+`operators` are the commands, `interface` is what one sees of them.
+"""
+
+from . import interface, operators
+
+CLASSES = (*operators.CLASSES, *interface.CLASSES)
+
+
+def register() -> None:
+    """Called by Blender when the extension is enabled."""
+    import bpy
+
+    for entry in CLASSES:
+        bpy.utils.register_class(entry)
+    interface.add_menus()
+
+
+def unregister() -> None:
+    """Called by Blender when the extension is disabled."""
+    import bpy
+
+    interface.remove_menus()
+    for entry in reversed(CLASSES):
+        bpy.utils.unregister_class(entry)

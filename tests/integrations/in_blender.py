@@ -1,0 +1,240 @@
+"""What the extension does inside Blender, as a script: `PYTHON in_blender.py FOLDER_OF_EXTENSION FLEXPARA`.
+
+Needs numpy and bpy and nothing of ours; prints a line of JSON, or ends with the assertion that failed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+
+def enabled(folder: Path, program: str) -> Any:
+    """Enable the extension by its folder, as a package of the name that its folder has."""
+    sys.path.insert(0, str(folder.parent))
+    extension = importlib.import_module(folder.name)
+    extension.register()
+    extension.child.find = lambda preferred="": program or preferred
+    return extension
+
+
+def empty() -> None:
+    """A scene without anything."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+
+
+def picked(*things: Any) -> None:
+    """Select these, the last one active."""
+    bpy.ops.object.select_all(action="DESELECT")
+    for thing in things:
+        thing.select_set(True)
+    bpy.context.view_layer.objects.active = things[-1]
+
+
+def select_faces(thing: Any, *numbers: int) -> None:
+    """Go into edit mode with these faces selected, and no other."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+    bpy.ops.mesh.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for number in numbers:
+        thing.data.polygons[number].select = True
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def uv_of(thing: Any) -> np.ndarray:
+    """(l, 2) float64 of the active layer."""
+    values = np.zeros(2 * len(thing.data.loops), np.float32)
+    thing.data.uv_layers.active.uv.foreach_get("vector", values)
+    return values.reshape(-1, 2).astype(np.float64)
+
+
+def signed_area(uv: np.ndarray) -> float:
+    x, y = uv.T
+    return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def areas(thing: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Of each polygon: area in the world, signed area in uv."""
+    uv, scale = uv_of(thing), thing.matrix_world.to_scale()
+    assert len(set(np.round(scale, 6))) == 1
+    space = np.array([face.area for face in thing.data.polygons]) * scale[0] ** 2
+    return space, np.array([signed_area(uv[list(face.loop_indices)]) for face in thing.data.polygons])
+
+
+def seams_are_where_uv_part(thing: Any) -> bool:
+    """Blender's seams are the edges at which the uv of two polygons differ."""
+    uv, ends = uv_of(thing), dict[int, set[tuple[float, ...]]]()
+    for face in thing.data.polygons:
+        loops = list(face.loop_indices)
+        for loop, after in zip(loops, loops[1:] + loops[:1], strict=True):
+            entry = thing.data.loops
+            pair = sorted([(entry[loop].vertex_index, *uv[loop]), (entry[after].vertex_index, *uv[after])])
+            ends.setdefault(entry[loop].edge_index, set()).add(tuple(number for row in pair for number in row))
+    return all(thing.data.edges[edge].use_seam == (len(pairs) > 1) for edge, pairs in ends.items())
+
+
+def same_density(*things: Any) -> bool:
+    """All polygons are the right way up, and have nearly as much uv for each unit."""
+    pairs = [areas(thing) for thing in things]
+    space, flat = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    share = flat / space * space.sum() / flat.sum()
+    return bool((flat > 0.0).all() and np.quantile(share, 0.05) > 0.6 and np.quantile(share, 0.95) < 1.6)
+
+
+def cube() -> None:
+    empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2) == {"FINISHED"}
+    space, flat = areas(thing)
+    np.testing.assert_allclose(flat / space, (flat / space).mean(), rtol=1e-4)
+    assert flat.min() > 0.0
+    assert uv_of(thing).min() >= 0.0
+    assert uv_of(thing).max() <= 1.0
+    assert seams_are_where_uv_part(thing)
+    assert [len(face.vertices) for face in thing.data.polygons] == [4] * 6
+
+
+def suzanne() -> dict[str, float]:
+    """With an n-gon; beside Blender's own ways."""
+    empty()
+    bpy.ops.mesh.primitive_monkey_add()
+    thing = bpy.context.object
+    thing.data.uv_layers.remove(thing.data.uv_layers.active)
+    select_faces(thing, 0, 2, 4, 6)
+    bpy.ops.mesh.dissolve_faces()
+    start = time.perf_counter()
+    assert bpy.ops.flexpara.unwrap(size=512) == {"FINISHED"}
+    seconds = {"flexpara": time.perf_counter() - start}
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert max(len(face.vertices) for face in thing.data.polygons) > 4
+    assert seams_are_where_uv_part(thing)
+    assert same_density(thing)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    seconds |= peers()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return seconds
+
+
+def peers() -> dict[str, float]:
+    """Seconds of Blender's own commands on what is edited; minimum stretch along the seams that are there."""
+    ways = {"smart_project": lambda: bpy.ops.uv.smart_project()}
+    if bpy.app.version >= (4, 3, 0):
+        ways["minimum_stretch"] = lambda: bpy.ops.uv.unwrap(method="MINIMUM_STRETCH")
+    seconds = {}
+    for name, way in ways.items():
+        start = time.perf_counter()
+        assert way() == {"FINISHED"}
+        seconds[name] = time.perf_counter() - start
+    return seconds
+
+
+def modifiers() -> None:
+    """The base mesh is unwrapped; what modifiers make of it has uv, too."""
+    empty()
+    bpy.ops.mesh.primitive_cylinder_add(vertices=12)
+    thing = bpy.context.object
+    thing.modifiers.new("smooth", "SUBSURF")
+    thing.modifiers.new("twice", "ARRAY")
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2) == {"FINISHED"}
+    assert sorted({len(face.vertices) for face in thing.data.polygons}) == [4, 12]
+    assert seams_are_where_uv_part(thing)
+    assert same_density(thing)
+    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    assert len(evaluated.polygons) > 2 * len(thing.data.polygons)
+    assert evaluated.uv_layers.active is not None
+
+
+def several() -> None:
+    """Two objects of other scales share one atlas, at one density in the world; a third is left alone."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add(location=(4, 0, 0))
+    alone = bpy.context.object
+    before = uv_of(alone)
+    bpy.ops.mesh.primitive_cube_add()
+    first = bpy.context.object
+    bpy.ops.mesh.primitive_cube_add(size=2, scale=(3, 3, 3))
+    second = bpy.context.object
+    picked(first, second)
+    assert bpy.ops.flexpara.unwrap(size=512, padding=2) == {"FINISHED"}
+    assert same_density(first, second)
+    np.testing.assert_array_equal(uv_of(alone), before)
+    everything = np.concatenate([uv_of(first), uv_of(second)])
+    assert everything.min() >= 0.0
+    assert everything.max() <= 1.0
+    assert bpy.ops.flexpara.repack(size=256, padding=1) == {"FINISHED"}
+    assert same_density(first, second)
+
+
+def selected_faces() -> None:
+    """Other faces keep their uv."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    before = uv_of(thing)
+    select_faces(thing, 1, 2)
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2, selected_only=True) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    changed = (np.abs(uv_of(thing) - before).max(axis=1) > 0.0).reshape(6, 4).any(axis=1)
+    assert changed.tolist() == [False, True, True, False, False, False]
+
+
+def evaluate_and_bake() -> None:
+    """Charts and distortion become attributes, numbers are kept, maps become packed pictures."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    assert bpy.ops.flexpara.evaluate() == {"FINISHED"}
+    assert bpy.context.scene["flexpara"]["charts"] == 1
+    attribute = thing.data.attributes["flexpara distortion"]
+    assert abs(max(entry.value for entry in attribute.data) - 1.0) < 1e-5
+    assert thing.data.color_attributes.active_color.name == "flexpara distortion color"
+    assert bpy.ops.flexpara.bake(maps="normal,uv-checker", size=64) == {"FINISHED"}
+    assert len([image for image in bpy.data.images if image.packed_file and image.size[0] == 64]) == 2
+
+
+def failures() -> None:
+    """What flexpara complains of is Blender's error, and nothing is changed."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    before = uv_of(thing)
+    refused = ""
+    try:
+        bpy.ops.flexpara.unwrap(size=16, padding=8)
+    except RuntimeError as error:
+        refused = str(error)
+    assert "padding is 8 texels" in refused
+    np.testing.assert_array_equal(uv_of(thing), before)
+
+
+def main(folder: str, program: str) -> None:
+    """All checks."""
+    extension = enabled(Path(folder), program)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    cube()
+    seconds = suzanne()
+    for check in (modifiers, several, selected_faces, evaluate_and_bake):
+        check()
+    failures()
+    extension.unregister()
+    assert not hasattr(bpy.types, "FLEXPARA_OT_unwrap")
+    sys.stdout.write(json.dumps({"blender": bpy.app.version_string, "seconds": seconds}) + "\n")
+    sys.stdout.flush()
+    os._exit(0)  # bpy 4.2 may crash while it is taken down
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
