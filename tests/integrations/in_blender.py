@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
+
+bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
 
 
 def enabled(folder: Path, program: str) -> Any:
