@@ -72,7 +72,7 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> str:
     """What is not the same, or the largest deviations."""
     names = [name for name in ("objects", "materials", "actions") if _named(before, name) != _named(after, name)]
     wrong = [f"{name}: {_named(before, name)} → {_named(after, name)}" for name in names]
-    if not before["facts"]["meshes"] or not after["facts"]["meshes"]:
+    if any(seen.get("poses_0", np.zeros(0)).size == 0 for seen in (before, after)):
         return "; ".join([*wrong, "no polygons to compare"])
     extent = max(float(np.ptp(before["poses_0"].reshape(-1, 3), axis=0).max()), 1e-30)
     turned = moved = 0.0
