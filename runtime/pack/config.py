@@ -37,6 +37,30 @@ class PlaceConfig:
 
 
 @dataclass(frozen=True)
+class NestConfig:
+    """A layout of charts as bitmaps, beside the first one; the better of the two is taken when both have grown."""
+
+    most: int = 300
+    """Charts up to which it is tried."""
+    side: int = 256
+    """Cells along the page."""
+    more: float = 1.04
+    """How many times that many a layout may need."""
+    fill: float = 0.58
+    """Share of the square that charts are first thought to fill."""
+    sizings: int = 6
+    """How often their size is corrected."""
+    slants: int = 2
+    """Angles within a quarter turn at which charts are tried."""
+    tries: int = 16
+    """Orders that are tried at most …"""
+    dropped: int = 800
+    """… and charts that are laid in all of them together."""
+    shuffle: float = 0.3
+    """By how much (natural logarithm) sizes are falsified for a new order, typically."""
+
+
+@dataclass(frozen=True)
 class GrowthConfig:
     """Linear programs that move placed charts and let them grow until they jam."""
 
@@ -105,6 +129,7 @@ class PackConfig:
     """All of them."""
 
     place: PlaceConfig = field(default_factory=PlaceConfig)
+    nest: NestConfig = field(default_factory=NestConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
     density: DensityConfig = field(default_factory=DensityConfig)

@@ -69,3 +69,10 @@ def upright_angle(outline: NDArray[np.float64], *, square: bool) -> float:
     width = np.ptp(points[:, 0] * cosine - points[:, 1] * sine, axis=1)
     height = np.ptp(points[:, 0] * sine + points[:, 1] * cosine, axis=1)
     return float(angles[np.argmin(np.maximum(width, height) if square else width * height)])
+
+
+def is_rectangle(outline: NDArray[np.float64], accuracy: float = 1e-6) -> bool:
+    """Whether an upright outline (s, 2, 2) fills its bounding box, to a part of its area."""
+    start, end = outline[:, 0], outline[:, 1]
+    area = 0.5 * float((start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum())
+    return abs(area) >= (1.0 - accuracy) * float(np.prod(np.ptp(outline, axis=(0, 1))))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -25,8 +25,9 @@ from ..mesh import Asset, Atlas, Charts
 from .config import PackConfig
 from .growth import apply_placement, grown
 from .lattice import STEPS, Snapped, snap
+from .nesting import find_nested
 from .outlines import chart_outlines, outline_edges, rotation, upright_angle
-from .placement import find_layout
+from .placement import Layout, find_layout
 from .seamvertices import atlas_normals, split_vertices
 
 if TYPE_CHECKING:
@@ -74,9 +75,11 @@ def pack(
     config = config or PackConfig()
     _check(asset, charts, size, padding)
     edges = outline_edges(asset.surface.faces, charts)
-    first, report = _placed(charts, chart_outlines(charts, edges), size, padding, config, seed)
-    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(first, size, padding), config)
-    fitted = fit(2.0)
+    places, report = _placed(charts, chart_outlines(charts, edges), size, padding, config, seed)
+    jammed = [_grown(charts, edges, _Place(first, size, padding), config, 2.0) for first in places]
+    best = max(range(len(jammed)), key=lambda number: scale_of(jammed[number][0]))
+    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(places[best], size, padding), config)
+    fitted = fit(2.0, jammed[best])
     for _ in range(config.lattice.retries):
         if fitted.snapped.farthest <= fitted.slack:
             break
@@ -84,7 +87,7 @@ def pack(
     snapped, placement = fitted.snapped, fitted.placement
     atlas = as_atlas(asset, charts, fitted, size, padding)
     report |= {
-        "chart_scale": float(np.sqrt(np.linalg.det(placement[0, :, :2]))),
+        "chart_scale": scale_of(placement),
         "skipped_growth_steps": fitted.skipped,
     }
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
@@ -94,14 +97,16 @@ def pack(
 
 def _placed(
     charts: Charts, outlines: list[NDArray[np.float64]], size: int, padding: int, config: PackConfig, seed: int
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
-    """A first placement (k, 2, 3) of the charts, and what limits it."""
+) -> tuple[list[NDArray[np.float64]], dict[str, Any]]:
+    """First placements (k, 2, 3) of the charts, of which the better is to be found, and what limits them."""
     angles = np.array([upright_angle(outline, square=len(outlines) == 1) for outline in outlines])
     upright = [outline @ rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
     area = float(np.abs(signed_areas(charts.corner_uv)).sum())
     # a hair more than the padding: charts that touch could not be parted by letting them shrink
-    layout = find_layout(upright, area, padding / size + 4.0 / STEPS, config.place, np.random.default_rng(seed))
-    linear = np.stack([layout.scale * rotation(angle) for angle in angles + layout.angle])
+    room = padding / size + 4.0 / STEPS
+    layout = find_layout(upright, area, room, config.place, np.random.default_rng(seed))
+    nested = find_nested(upright, _folded(charts), area, room, config.nest, np.random.default_rng(seed))
+    layouts = [layout] if nested is None else [layout, nested]
     extent = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
     longest = int(extent.argmax())
     limits = {
@@ -109,7 +114,25 @@ def _placed(
         "longest_chart_share": float(extent[longest] * layout.scale),
         "length_limits": bool(extent[longest] > config.place.long * math.sqrt(area)),
     }
-    return np.concatenate([linear, layout.origin[:, :, None]], axis=2), limits
+    return [_placement(found, angles) for found in layouts], limits
+
+
+def _placement(layout: Layout, upright: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 2, 3) of charts that stand upright at these angles (k,)."""
+    linear = np.stack([layout.scale * rotation(angle) for angle in upright + layout.angle])
+    return np.concatenate([linear, layout.origin[:, :, None]], axis=2)
+
+
+def _folded(charts: Charts) -> NDArray[np.bool_]:
+    """(k,) bool: charts in which some triangles lie the other way round than others."""
+    area = signed_areas(charts.corner_uv)
+    both = np.bincount(charts.face_chart, np.abs(area)), np.abs(np.bincount(charts.face_chart, area))
+    return both[1] < both[0] * (1.0 - 1e-9)
+
+
+def scale_of(placement: NDArray[np.float64]) -> float:
+    """Atlas units per source unit of a placement (k, 2, 3)."""
+    return float(np.sqrt(np.linalg.det(placement[0, :, :2])))
 
 
 def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, size: int, padding: int) -> Atlas:
@@ -162,6 +185,16 @@ class Fitted(NamedTuple):
     slack: float
 
 
+Grown: TypeAlias = "tuple[NDArray[np.float64], int]"
+"""A placement (k, 2, 3) of charts that jammed, and how many steps on the way had no solution."""
+
+
+def _grown(charts: Charts, edges: NDArray[np.bool_], first: _Place, config: PackConfig, slack: float) -> Grown:
+    """Charts grown from where they were placed; slack: what is kept free beyond the padding, lattice units."""
+    outlines = chart_outlines(charts, edges)
+    return grown(first.placement, outlines, first.size, first.padding, config.growth, slack=slack / STEPS)
+
+
 def fitted_charts(
     mesh: NDArray[np.int64],
     charts: Charts,
@@ -169,13 +202,13 @@ def fitted_charts(
     first: _Place,
     config: PackConfig,
     slack: float,
+    known: Grown | None = None,
 ) -> Fitted:
     """Charts of faces mesh (f, 3), grown from where they were placed and snapped to the lattice.
 
-    slack: what is kept free beyond the padding, lattice units.
+    slack: what is kept free beyond the padding, lattice units.  known: what they grow to with it.
     """
-    outlines = chart_outlines(charts, edges)
-    placement, skipped = grown(first.placement, outlines, first.size, first.padding, config.growth, slack=slack / STEPS)
+    placement, skipped = known or _grown(charts, edges, first, config, slack)
     faces, snapped = on_lattice(mesh, charts, edges, placement, config)
     return Fitted(placement, skipped, snapped, faces, slack)
 
