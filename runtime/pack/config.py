@@ -50,11 +50,11 @@ class NestConfig:
     """Share of the square that charts are first thought to fill."""
     sizings: int = 6
     """How often their size is corrected."""
-    slants: int = 2
+    slants: int = 1
     """Angles within a quarter turn at which charts are tried."""
-    tries: int = 16
+    tries: int = 24
     """Orders that are tried at most …"""
-    dropped: int = 800
+    dropped: int = 1200
     """… and charts that are laid in all of them together."""
     shuffle: float = 0.3
     """By how much (natural logarithm) sizes are falsified for a new order, typically."""

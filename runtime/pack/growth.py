@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import coo_array, vstack
 
+from ..errors import FinishError
 from ..geometry.gaps import closest_points, facing_segments
 from .padding import Crowd, padded
 
@@ -84,7 +85,10 @@ def jammed(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> t
         for step in range(config.steps):
             found = _step(moved, pairs, border, apart, trust * config.calmer**step)
             moved, skipped = found or moved, skipped + (found is None)
-        moved = padded(moved, border, apart, config)
+        try:
+            moved = padded(moved, border, apart, config)
+        except FinishError:  # charts in each other's bays went through each other: this round is undone
+            moved = replace(crowd, factor=0.0)
         trust *= config.calmer**config.steps if moved.factor > crowd.factor else config.smaller
         crowd = max(crowd, moved, key=lambda one: one.factor)
     return crowd, skipped
