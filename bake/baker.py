@@ -58,8 +58,9 @@ def bake(
 
     Returns: name → Texture, linear float32 pixels (size, size, c).
 
-    Raises: InputError for an unknown map or keyword, a size or uv that cannot be drawn, a map that lacks its source;
-        MissingDependencyError when "opengl" is asked for and cannot be had.
+    Raises:
+        InputError: an unknown map or keyword, a size or uv that cannot be drawn, a map that lacks its source.
+        MissingDependencyError: "opengl" is asked for and cannot be had.
     """
     if isinstance(asset, Mapping):
         if maps is not None:

@@ -11,15 +11,8 @@ from flexpara.__main__ import main
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [
-    ROOT / name
-    for name in (
-        "README.md",
-        "CONTRIBUTING.md",
-        "CHANGELOG.md",
-        "docs/glossary.md",
-        "docs/benchmarks.md",
-        "docs/xatlas.md",
-    )
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "examples/README.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
 ]
 COMMAND = re.compile(r"^(?:.*&& )?flexpara (\w+) ([^#\n]*)", re.MULTILINE)
 

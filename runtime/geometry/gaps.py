@@ -50,8 +50,10 @@ def facing_segments(
     Returns:
         (p, 2) int64 segment indices; none where there is one chart only, or all outlines lie on one line.
     """
+    if len(np.unique(chart)) < 2:  # closed surfaces without a seam have no outline at all
+        return np.zeros((0, 2), dtype=np.int64)
     extent = np.ptp(segments.reshape(-1, 2), axis=0)
-    if len(np.unique(chart)) < 2 or extent.min() <= 1e-9 * extent.max():
+    if extent.min() <= 1e-9 * extent.max():
         return np.zeros((0, 2), dtype=np.int64)
     points, owner = sample_segments(segments, spacing)
     order = np.lexsort((chart[owner], points[:, 1], points[:, 0]))

@@ -209,3 +209,12 @@ def test_all_common_metrics_agree_with_the_independent_evaluator(models: Path, n
     assert (theirs["eff_square"] - ours.packing_efficiency) * 1.0 == pytest.approx(
         theirs["eff_square"] * ours.overlap_fraction, abs=1e-9
     )
+
+
+def test_two_closed_surfaces_without_a_seam_have_no_gap() -> None:
+    """Their charts have no outline."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    surface = Surface(np.concatenate([corners, corners + 3.0]), np.concatenate([faces, faces + 4]))
+    uv = surface.vertices @ np.array([[0.1, 0.0], [0.0, 0.1], [0.03, 0.07]])
+    assert measure(surface, uv[surface.faces], size=64).chart_gap_texels in (None, 0.0)
