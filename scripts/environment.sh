@@ -48,7 +48,7 @@ install_requirements() {
     wanted=$(cat pyproject.toml scripts/constraints.txt | cksum)
     if [ "$(cat .venv/installed 2>/dev/null)" != "$wanted" ]; then
         say "installing Python packages into .venv (several minutes the first time)"
-        "$python" -m pip install --quiet --disable-pip-version-check -c scripts/constraints.txt -e ".[all,test,dev]" ||
+        "$python" -m pip install --quiet --disable-pip-version-check -c scripts/constraints.txt -e ".[all,test,dev,docs]" ||
             fail "pip could not install the packages: see the message above"
         printf '%s\n' "$wanted" >.venv/installed
     fi

@@ -1,7 +1,7 @@
 """Every block of the documents runs: commands of flexpara, Python, JSON; a page's blocks in their order, in one folder.
 
-Files that the pages name lie there, as small surfaces; sizes of images are made small, samples are spheres.  Other programs (pip, git) are
-known by name and not run, and blocks of other languages are shown.
+Files that the pages name lie there, as small surfaces; sizes of images are made small, samples are spheres.  Other
+programs (pip, git) are known by name and not run, and blocks of other languages are shown.
 """
 
 from __future__ import annotations
