@@ -65,12 +65,16 @@ class Stages:
 
     def __call__(self, name: str) -> None:
         """A stage begins."""
-        if self._progress is None:
-            return
-        if self._running:
-            self._progress(self._running, 1, 1)
+        self.end()
         self._running = name
-        self._progress(name, 0, 1)
+        if self._progress is not None:
+            self._progress(name, 0, 1)
+
+    def end(self) -> None:
+        """The stage that runs is done."""
+        if self._progress is not None and self._running:
+            self._progress(self._running, 1, 1)
+        self._running = ""
 
 
 def progress_lines(stage: str, step: int, steps: int, loss: float | None = None) -> None:

@@ -147,10 +147,12 @@ class FineConfig:
     """How much farther apart in uv than in space two of them are where a slit runs between them."""
     rings: int = 3
     """Rings of faces around a flipped one that turn as those beside them."""
-    trims: int = 8
-    """Times faces that stay folded are cut off a chart …"""
-    most_wrong: float = 1e-3
-    """… as long as they are no more than this share of its faces."""
+    most_wrong: float = 5e-3
+    """Share of a chart's faces that may be flipped, or overlap along its border, and are cut off …"""
+    around: int = 1
+    """… with so many rings around what is flipped …"""
+    most_off: float = 0.02
+    """… as long as no larger share goes with them."""
     contacts: int = 2
     """Steps more, in which what came to overlap is held where it was …"""
     hold: float = 1e3

@@ -102,6 +102,15 @@ def face_components(n_faces: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]
     return connected_components(link, directed=False)[1].astype(np.int64)
 
 
+def within_rings(faces: NDArray[np.int64], chosen: NDArray[np.bool_], count: int, rings: int) -> NDArray[np.bool_]:
+    """(f,) bool: chosen (f,) faces (f, 3) and those within so many rings of them; count: of vertices."""
+    for _ in range(rings if chosen.any() else 0):
+        touched = np.zeros(count, dtype=bool)
+        touched[faces[chosen]] = True
+        chosen = touched[faces[:, 0]] | touched[faces[:, 1]] | touched[faces[:, 2]]
+    return chosen
+
+
 def components(faces: NDArray[np.int64], table: EdgeTable | None = None) -> NDArray[np.int64]:
     """Components of faces (f, 3) connected through edges; (f,) int64 labels numbered by the lowest face.
 

@@ -16,13 +16,13 @@ from scipy import sparse
 
 from ...runtime.geometry.distortion import singular_values
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
-from ...runtime.geometry.topology import boundary_loops, components, edge_table
+from ...runtime.geometry.topology import boundary_loops, components, edge_table, within_rings
 from ...runtime.mesh import Surface
 from ..finish.arap import RigidSteps, evened_out, nearest_rotations
 from ..finish.contact import boundary_edges, rim_faces
 from ..finish.fallback import unwrapped_by_xatlas
-from ..finish.flaps import restricted
-from ..finish.flatten import Pins, jacobians
+from ..finish.flaps import flap_faces, restricted
+from ..finish.flatten import Pins
 from ..finish.openings import openings, slit_along
 from ..finish.pieces import Piece, extract, measured, try_piece
 from ..finish.slits import Flat
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..config import FinishConfig
+    from ..config import FineConfig, FinishConfig
     from ..finish.arap import Solve
 
 
@@ -73,13 +73,15 @@ def refined_piece(
 ) -> list[Piece]:
     """The faces ids (m,) laid out like their source, and what had to be cut off; empty where no way to is valid."""
     whole = extract(surface, ids)
+    allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []
     for disk in opened_alike(whole, source, config):
         uv, wrong = laid_out(disk, source.flat, config)
         found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config)
         if found and (not best or total_cost(found, config) < total_cost(best, config)):
             best = found
-    allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
+        if best and best[0].energy <= allowed:
+            break
     if not best or best[0].energy > allowed:
         return []
     return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]
@@ -98,24 +100,31 @@ def without_folds(
     total: float,
     config: FinishConfig,
 ) -> list[Piece]:
-    """The piece, first, and the wrong (m,) faces that were cut off it, a little around them included, as others."""
+    """The piece, first, less the faces that fold or lie over others, and these, cut off, as others.
+
+    Where any are ``wrong`` (m,), all are tested: a border may run over faces farther in.
+    """
     rows, rest = np.arange(len(ids)), flat
-    for _ in range(config.fine.trims if wrong.any() else 0):
-        if wrong.mean() > config.fine.most_wrong:
-            return []
-        keep = ~grown(flat.surface.faces, wrong, len(flat.uv), 1)
-        part = components(flat.surface.faces[keep])
-        rows = np.flatnonzero(keep)[part == np.bincount(part).argmax()]
-        rest = restricted(flat, rows)
-        found = wrong_faces(rest)
-        wrong = ~np.isin(np.arange(len(ids)), rows)
-        wrong[rows[found]] = True
-        if not found.any():
-            break
-    if wrong_faces(rest).any():
+    if wrong.mean() > config.fine.most_wrong:
         return []
-    off = np.setdiff1d(np.arange(len(ids)), rows)
-    return [measured(surface, ids[rows], rest, total, ()), *flaps_apart(surface, ids[off], total, config)]
+    if wrong.any():
+        off = in_the_way(flat, config.fine)
+        if off.mean() > config.fine.most_off:
+            return []
+        part = components(flat.surface.faces[~off])
+        rows = np.flatnonzero(~off)[part == np.bincount(part).argmax()]
+        rest = restricted(flat, rows)
+    off_ids = np.setdiff1d(np.arange(len(ids)), rows)
+    return [measured(surface, ids[rows], rest, total, ()), *flaps_apart(surface, ids[off_ids], total, config)]
+
+
+def in_the_way(flat: Flat, config: FineConfig) -> NDArray[np.bool_]:
+    """(f,) bool: flipped faces and those around them, and of two that overlap one: without these it is valid."""
+    faces = flat.surface.faces
+    off = within_rings(faces, flipped_triangles(flat.uv[faces]), len(flat.uv), config.around)
+    rest = np.flatnonzero(~off)
+    off[rest[flap_faces(flat.uv[faces[rest]], flat.surface.face_areas()[rest])]] = True
+    return off
 
 
 def flaps_apart(surface: Surface, ids: NDArray[np.int64], total: float, config: FinishConfig) -> list[Piece]:
@@ -130,31 +139,23 @@ def flaps_apart(surface: Surface, ids: NDArray[np.int64], total: float, config: 
     return pieces
 
 
-def grown(faces: NDArray[np.int64], chosen: NDArray[np.bool_], count: int, rings: int) -> NDArray[np.bool_]:
-    """(f,) bool: chosen (f,) faces and those within so many rings of them; count of vertices."""
-    for _ in range(rings):
-        touched = np.zeros(count, dtype=bool)
-        touched[faces[chosen]] = True
-        chosen = np.asarray(touched[faces].any(axis=1))
-    return chosen
-
-
-def wrong_faces(flat: Flat) -> NDArray[np.bool_]:
-    """(f,) bool: flipped, or along a border that crosses itself there."""
-    faces = flat.surface.faces
-    wrong = flipped_triangles(flat.uv[faces])
-    rim = rim_faces(faces, boundary_edges(faces))
-    wrong[rim[overlapping_pairs(flat.uv[faces[rim]]).reshape(-1)]] = True
+def wrong_faces(faces: NDArray[np.int64], rim: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(f,) bool: faces (f, 3) that uv (v, 2) flips, and those of the border, ``rim``, that overlap each other."""
+    wrong = flipped_triangles(uv[faces])
+    wrong[rim[overlapping_pairs(uv[faces[rim]]).reshape(-1)]] = True
     return wrong
 
 
 def opened_alike(whole: Surface, source: Piece, config: FinishConfig) -> Iterator[Surface]:
-    """The ways to open a piece that leave as many borders as its source has; all ways where none does."""
+    """The ways to open a piece, first those that leave as many borders as its source has."""
     slit = slit_along(whole, source.slits, config.slit)
-    ways = [opening.disk for opening in openings(slit, config.slit.seams)]
-    loops = len(boundary_loops(source.flat.surface.faces))
-    alike = [way for way in ways if len(boundary_loops(way.faces)) == loops]
-    yield from alike or ways
+    loops, others = len(boundary_loops(source.flat.surface.faces)), []
+    for opening in openings(slit, config.slit.seams):
+        if len(boundary_loops(opening.disk.faces)) == loops:
+            yield opening.disk
+        else:
+            others.append(opening.disk)
+    yield from others
 
 
 def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -162,48 +163,51 @@ def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> tuple[NDArray
 
     First with the source's stretch, contacts and all, then as rigid as it may become without overlap.
     """
-    fine = config.fine
+    fine, faces = config.fine, disk.faces
     nearest = faces_beside(disk, source, config)
     coarse = weights_of(disk, source.surface, nearest)
     solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
+    rim = rim_faces(faces, boundary_edges(faces))
     rigid = RigidSteps(disk, solver)
     uv = rigid.solve(bounded(carried_jacobians(disk, source, nearest), fine.steepest), coarse @ source.uv)
-    best, fewest = uv, np.ones(len(disk.faces), dtype=bool)
+    best, fewest = uv, np.ones(len(faces), dtype=bool)
     touching = np.zeros(len(uv), dtype=bool)
-    for _ in range(fine.steps + fine.contacts):
-        flat = evened_out(disk.faces, uv, config.slit.contact.unfolding)
-        found = wrong_faces(Flat(disk, uv if flat is None else flat, {}))
+    for step in range(fine.steps + fine.contacts):
+        if step:
+            uv = rigid.solve(rotations(rigid, uv, fine.rings), uv)
+        flat = evened_out(faces, uv, config.slit.contact.unfolding)
+        found = wrong_faces(faces, rim, uv if flat is None else flat)
         if found.sum() <= fewest.sum():
             best, fewest = uv if flat is None else flat, found
         elif not fewest.any():
-            touching[disk.faces[found]] = True
+            touching[faces[found]] = True
             held = np.flatnonzero(touching)
             rigid = RigidSteps(disk, solver, Pins(held, best[held], fine.hold))
             uv = best
-        uv = rigid.solve(rotations(disk, uv, fine.rings), uv)
     return best, fewest
 
 
-def rotations(disk: Surface, uv: NDArray[np.float64], rings: int) -> NDArray[np.float64]:
+def rotations(rigid: RigidSteps, uv: NDArray[np.float64], rings: int) -> NDArray[np.float64]:
     """(f, 2, 2) nearest rotations at uv (v, 2); faces within ``rings`` of a flipped one turn as the others beside them.
 
     A fold at the border is stable: every face of it is as rigid as can be.
     """
-    turn = nearest_rotations(jacobians(disk, uv))
-    wrong = grown(disk.faces, flipped_triangles(uv[disk.faces]), len(uv), rings)
-    if wrong.all() or not wrong.any():
-        return turn
-    beside = spread(disk, wrong)
-    fold = np.flatnonzero(beside != np.arange(len(beside)))
-    part = Surface(disk.vertices, disk.faces[fold])
-    turn[fold] = nearest_rotations(carried_jacobians(part, Flat(disk, uv, {}), beside[fold]))
+    vertices, faces = rigid.surface.vertices, rigid.surface.faces
+    turn = nearest_rotations(rigid.jacobians(uv))
+    wrong = within_rings(faces, flipped_triangles(uv[faces]), len(uv), rings)
+    near = np.flatnonzero(within_rings(faces, wrong, len(uv), 1))
+    beside = spread(faces[near], wrong[near])
+    fold = np.flatnonzero(beside != np.arange(len(near)))
+    if len(fold):
+        part, around = Surface(vertices, faces[near[fold]]), Surface(vertices, faces[near])
+        turn[near[fold]] = nearest_rotations(carried_jacobians(part, Flat(around, uv, {}), beside[fold]))
     return turn
 
 
-def spread(disk: Surface, wrong: NDArray[np.bool_]) -> NDArray[np.int64]:
+def spread(faces: NDArray[np.int64], wrong: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(f,) the face itself, or for wrong (f,) ones the nearest other across edges; themselves where there is none."""
     beside, left = np.arange(len(wrong)), wrong.copy()
-    table = edge_table(disk.faces)
+    table = edge_table(faces)
     pairs = table.edge_faces[table.manifold]
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
     pairs = pairs[wrong[pairs[:, 1]]]

@@ -31,7 +31,7 @@ from .develop import Development, unfold
 from .notes import hurried, notes
 from .parts import Part, split_parts
 from .planar import flat_regions
-from .proof import is_valid, proven, verify
+from .proof import all_proven, is_valid
 from .slivers import steadied
 
 if TYPE_CHECKING:
@@ -105,9 +105,8 @@ def chart_surface(
         for piece in solved[part.copy_of if part.copy_of >= 0 else number].pieces
     ]
     stage("exact check")
-    pieces = [part for piece in pieces for part in proven(surface, piece)]
-    pieces.sort(key=lambda piece: int(piece.ids.min()))
-    verify(pieces)
+    pieces = sorted(all_proven(surface, pieces), key=lambda piece: int(piece.ids.min()))
+    stage.end()
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
     told = (*hurried(stage.deadline, late), *notes(solved, charts, config))

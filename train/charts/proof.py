@@ -10,6 +10,7 @@ from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.flaps import trimmed
 from ..finish.pieces import Overlapping
+from ..workers import parallel_map
 
 if TYPE_CHECKING:
     from ...runtime.mesh import Surface
@@ -26,6 +27,22 @@ def verify(pieces: list[Piece]) -> None:
                 f"chart {number} of {len(piece.ids)} faces has {flips} flipped triangles and {overlaps} overlapping "
                 "pairs, expected none; please report the mesh"
             )
+
+
+def all_proven(surface: Surface, pieces: list[Piece]) -> list[Piece]:
+    """The pieces, each as it is where the exact check passes, else what ``proven`` makes of it.
+
+    Raises: FinishError where that is not valid either (a defect).
+    """
+    order = sorted(range(len(pieces)), key=lambda number: -len(pieces[number].ids))
+    valid = dict(zip(order, parallel_map(lambda number: is_valid(pieces[number]), order), strict=True))
+    found: list[Piece] = []
+    for number, piece in enumerate(pieces):
+        parts = [piece] if valid[number] else proven(surface, piece)
+        if not valid[number]:
+            verify(parts)
+        found += parts
+    return found
 
 
 def proven(surface: Surface, piece: Piece) -> list[Piece]:

@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 
 from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.topology import within_rings
 from .curvature import factorize
-from .flatten import jacobians
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,6 +61,11 @@ class RigidSteps:
             self.pull[pins.vertex] = pins.weight * pins.place
         self.system = solver((matrix + sparse.diags_array(held)).tocsr())
 
+    def jacobians(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(f, 2, 2) as ``flatten.jacobians`` of uv (v, 2), from the gradient that is there."""
+        along, across = np.split(self.gradient @ uv, 2)
+        return np.stack([along, across], axis=2)
+
     def solve(self, turn: NDArray[np.float64], start: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Uv (v, 2) whose Jacobians are nearest to turn (f, 2, 2), rotations mostly, weighted by area.
 
@@ -76,7 +81,7 @@ class RigidSteps:
         """Uv (v, 2) after ``steps`` from rotations turn (f, 2, 2)."""
         uv = self.solve(turn, start)
         for _ in range(steps - 1):
-            uv = self.solve(nearest_rotations(jacobians(self.surface, uv)), uv)
+            uv = self.solve(nearest_rotations(self.jacobians(uv)), uv)
         return uv
 
 
@@ -113,7 +118,7 @@ def unfolded(surface: Surface, uv: NDArray[np.float64], steps: int) -> NDArray[n
     """
     rigid = RigidSteps(surface)
     for _ in range(steps):
-        uv = rigid.solve(nearest_rotations(jacobians(surface, uv)))
+        uv = rigid.solve(nearest_rotations(rigid.jacobians(uv)))
         if not np.isfinite(uv).all():
             return None
         if not flipped_triangles(uv[surface.faces]).any():
@@ -126,21 +131,30 @@ def evened_out(faces: NDArray[np.int64], uv: NDArray[np.float64], steps: int) ->
 
     Each step looks a ring further around what is still flipped.  None where ``steps`` don't suffice.
     """
-    count = len(uv)
+    flipped = flipped_triangles(uv[faces])
+    if not flipped.any():
+        return uv
+    part = faces[within_rings(faces, flipped, len(uv), 2 * steps)]
+    mean, border = neighbour_means(part, len(uv))
+    loose = np.zeros(len(uv), dtype=bool)
+    for _ in range(steps):
+        flipped = flipped_triangles(uv[part])
+        if not flipped.any():
+            return uv
+        loose[part[flipped]] = True
+        loose[part[loose[part].any(axis=1)]] = True
+        loose[border] = False
+        moved = np.flatnonzero(loose)
+        rows, uv = mean[moved], uv.copy()
+        for _ in range(steps):
+            uv[moved] = rows @ uv
+    return None if flipped_triangles(uv[part]).any() else uv
+
+
+def neighbour_means(faces: NDArray[np.int64], count: int) -> tuple[sparse.csr_array, NDArray[np.int64]]:
+    """(v, v) weights that give each of ``count`` vertices the mean of its neighbours; those on the border."""
     start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     links = sparse.csr_array((np.ones(len(start)), (start, end)), shape=(count, count))
     border = np.unique(np.concatenate((links - links.T).nonzero()))
     links = (links + links.T > 0).astype(np.float64)
-    mean = sparse.diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links
-    loose = np.zeros(count, dtype=bool)
-    for _ in range(steps):
-        flipped = flipped_triangles(uv[faces])
-        if not flipped.any():
-            return uv
-        loose[faces[flipped]] = True
-        loose[faces[loose[faces].any(axis=1)]] = True
-        loose[border] = False
-        uv = uv.copy()
-        for _ in range(steps):
-            uv[loose] = (mean @ uv)[loose]
-    return None if flipped_triangles(uv[faces]).any() else uv
+    return sparse.csr_array(sparse.diags_array(1.0 / np.maximum(links.sum(axis=1), 1.0)) @ links), border

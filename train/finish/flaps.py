@@ -5,6 +5,7 @@ Most pieces that overlap do so by a few faces along a jagged border: a flap.  m 
 
 from __future__ import annotations
 
+from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -27,12 +28,22 @@ def flap_faces(uv: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[n
 
     uv: (m, 3, 2) corners, no face flipped.  areas: (m,).
     """
-    pairs = overlapping_pairs(uv)
+    over: dict[int, set[int]] = {}
+    for one, other in overlapping_pairs(uv).tolist():
+        over.setdefault(one, set()).add(other)
+        over.setdefault(other, set()).add(one)
     off = np.zeros(len(uv), dtype=bool)
-    while len(pairs):
-        faces, count = np.unique(pairs, return_counts=True)
-        off[faces[np.lexsort((areas[faces], -count))[0]]] = True
-        pairs = pairs[~off[pairs].any(axis=1)]
+    queue = [(-len(others), float(areas[face]), face) for face, others in over.items()]
+    heapify(queue)
+    while queue:
+        count, _, face = heappop(queue)
+        if count != -len(over[face]) or not over[face]:  # an entry from before others of its pairs went
+            continue
+        off[face] = True
+        for other in over.pop(face):
+            over[other].discard(face)
+            heappush(queue, (-len(over[other]), float(areas[other]), other))
+        over[face] = set()
     return off
 
 

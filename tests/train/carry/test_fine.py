@@ -22,7 +22,8 @@ from flexpara.train.carry.proxy import thinned
 from flexpara.train.charts import charts
 from flexpara.train.charts.charts import chart_surface, objective
 from flexpara.train.config import FineConfig, FinishConfig
-from flexpara.train.finish.arap import nearest_rotations
+from flexpara.train.finish.arap import RigidSteps, nearest_rotations
+from flexpara.train.finish.contact import boundary_edges, rim_faces
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.finish.pieces import Piece, make_piece
 from flexpara.train.finish.slits import Flat
@@ -42,6 +43,11 @@ def halves(surface: Surface) -> list[Piece]:
     up = surface.triangles.mean(axis=1)[:, 2] > 0.0
     found = [make_piece(surface, np.flatnonzero(side), 1.0, CONFIG) for side in (up, ~up)]
     return [piece for piece in found if piece is not None]
+
+
+def wrong_of(flat: Flat) -> np.ndarray:
+    faces = flat.surface.faces
+    return wrong_faces(faces, rim_faces(faces, boundary_edges(faces)), flat.uv)
 
 
 def assert_valid(piece: Piece) -> None:
@@ -113,26 +119,45 @@ def test_the_stretch_of_a_sliver_is_not_taken_over() -> None:
 def test_a_border_that_crosses_itself_and_flips_are_named() -> None:
     surface = unit("cloth", 12)
     uv = surface.vertices[:, :2].copy()
-    assert not wrong_faces(Flat(surface, uv, {})).any()
+    assert not wrong_of(Flat(surface, uv, {})).any()
     turn = 2.4 * np.pi * uv / np.ptp(uv[:, 0])
     rolled = np.stack([(4.0 + turn[:, 1]) * np.cos(turn[:, 0]), (4.0 + turn[:, 1]) * np.sin(turn[:, 0])], axis=1)
-    found = wrong_faces(Flat(surface, rolled, {}))
+    found = wrong_of(Flat(surface, rolled, {}))
     assert found.any()
-    mirrored = wrong_faces(Flat(surface, uv * [-1.0, 1.0], {}))
+    mirrored = wrong_of(Flat(surface, uv * [-1.0, 1.0], {}))
     assert mirrored.all()
 
 
 def test_a_fold_that_stays_is_cut_off_as_a_chart_of_its_own() -> None:
     surface = unit("cloth", 60)
     flat = Flat(surface, surface.vertices[:, :2].copy(), {})
-    flat = flat if not wrong_faces(flat).all() else Flat(surface, surface.vertices[:, 1::-1].copy(), {})
+    flat = flat if not wrong_of(flat).all() else Flat(surface, surface.vertices[:, 1::-1].copy(), {})
     corner = int((surface.vertices @ [1.0, 1.0, 0.0]).argmax())
     flat.uv[corner] -= 0.2
-    wrong = wrong_faces(flat)
+    wrong = wrong_of(flat)
     assert wrong.any()
     found = without_folds(surface, np.arange(len(surface.faces)), flat, wrong, 1.0, CONFIG)
     assert len(found) == 2
     assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(surface.faces)))
+    for piece in found:
+        assert_valid(piece)
+
+
+def test_a_border_that_runs_over_faces_farther_in_takes_them_all_out_at_once() -> None:
+    """A strip rolled up more than once around: its end lies a whole strip's width over its beginning."""
+    angle, across = np.meshgrid(np.linspace(0.0, 1.0, 400), np.linspace(0.0, 0.1, 16), indexing="ij")
+    turn = 2.0 * np.pi * 1.02 * angle
+    uv = np.stack([(1.0 + across) * np.cos(turn), (1.0 + across) * np.sin(turn)], axis=2).reshape(-1, 2)
+    index = np.arange(angle.size).reshape(angle.shape)
+    a, b, c, d = (part.reshape(-1) for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, d, c], axis=1), np.stack([a, c, b], axis=1)])
+    faces = faces if not flipped_triangles(uv[faces]).any() else faces[:, [0, 2, 1]]
+    surface = Surface(np.concatenate([uv, angle.reshape(-1, 1)], axis=1), faces)
+    flat = Flat(surface, uv, {})
+    config = replace(CONFIG, fine=FineConfig(most_off=0.05))
+    found = without_folds(surface, np.arange(len(faces)), flat, wrong_of(flat), 1.0, config)
+    assert len(found[0].ids) > 0.97 * len(faces)
+    assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(faces)))
     for piece in found:
         assert_valid(piece)
 
@@ -143,7 +168,7 @@ def test_faces_around_a_flip_turn_as_those_beside_them() -> None:
     uv = flat.vertices[:, :2].copy()
     plain = nearest_rotations(jacobians(flat, uv))
     uv[int((flat.vertices @ [1.0, 1.0, 0.0]).argmax())] -= 0.3
-    np.testing.assert_allclose(rotations(flat, uv, 3), plain, atol=1e-6)
+    np.testing.assert_allclose(rotations(RigidSteps(flat), uv, 3), plain, atol=1e-6)
 
 
 def test_a_chart_that_touches_itself_stays_apart() -> None:
@@ -164,7 +189,7 @@ def test_a_chart_that_touches_itself_stays_apart() -> None:
         surface = Surface(points, faces)
     found, wrong = laid_out(surface, Flat(surface, closed, {}), CONFIG)
     assert not wrong.any()
-    assert not wrong_faces(Flat(surface, found, {})).any()
+    assert not wrong_of(Flat(surface, found, {})).any()
 
 
 def test_a_large_part_is_searched_on_its_middle_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
