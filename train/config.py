@@ -30,6 +30,12 @@ class PlanarConfig:
     """Share of the shorter border that two developments must have in common to be joined."""
     aspect: float = 8.0
     """Long side over short side of a development that may be made of more compact ones."""
+    span: float = 1.6
+    """The same is allowed up to this length, as a multiple of √(surface area): such a strip fits on the page."""
+    gentle: float = 0.6
+    """Angle, in radians, up to which an edge between two strips belongs to a rounded surface."""
+    whole_end: float = 0.9
+    """Share of the wider strip's end that such an edge must take up."""
     long_side: float = 0.4
     """Share of the shorter border from which two are joined along a long side: then a strip may come of it."""
     fill: float = 0.51
@@ -91,6 +97,10 @@ class StartConfig:
     """Handles above which a part has many."""
     worth: float = 0.05
     """Share of the whole surface below which a part is of small share."""
+    main: float = 0.3
+    """Share of the whole surface from which a part gets all starts."""
+    counts_middle: tuple[float, ...] = (1.0, 0.0)
+    """Clusters of each start of a part between the two."""
     least_faces: int = 8
     """Faces a cluster has on average at least."""
     position_weight: float = 1.8
@@ -204,7 +214,7 @@ class FinishConfig:
     proxy_faces: int = 2500
     """Faces of the simplified surface on which charts are split and merged."""
     whole_faces: int = 8000
-    """Faces up to which a part that unfolds is searched as it is, not simplified."""
+    """Faces up to which a part that unfolds is searched as it is, not simplified; fewer for one of little area."""
     fewest_faces: int = 300
     """The same for a part of little area."""
     faces_per_handle: int = 80

@@ -97,8 +97,11 @@ def chart_surface(
         return solve_part(part.surface, charts, starts, config)
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
+    # one that is most of the work uses all cores itself; else each core works on a part of its own
+    apart = int(2 * len(parts[largest_first[0]].ids) > sum(len(parts[number].ids) for number in first))
     with one_thread_each():
-        solved = dict(zip(largest_first, parallel_map(solve, largest_first), strict=True))
+        found = [solve(number) for number in largest_first[:apart]] + parallel_map(solve, largest_first[apart:])
+    solved = dict(zip(largest_first, found, strict=True))
     pieces = [
         placed(piece, part, surface, total)
         for number, part in enumerate(parts)
@@ -164,6 +167,11 @@ class Starts:
         plain = int(np.clip(most * np.sqrt(self.share), min(self.config.fewest_faces, most), most))
         return max(plain, self.config.faces_per_handle * self.handles)
 
+    @property
+    def whole(self) -> int:
+        """Faces up to which a part that unfolds is searched as it is."""
+        return max(round(self.config.whole_faces * np.sqrt(self.share)), self.faces)
+
     @cached_property
     def handles(self) -> int:
         """The genus of the part."""
@@ -181,7 +189,9 @@ class Starts:
         start = self.config.start
         if self.handles > start.handles:
             return start.counts_holed
-        return start.counts_small if self.small else start.counts
+        if self.small:
+            return start.counts_small
+        return start.counts if self.share >= start.main else start.counts_middle
 
     def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
         """Connected pieces (f,), numbered 0…, of the proxy, one start after the other."""
@@ -198,12 +208,12 @@ class Starts:
 
 def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
     """Charts of a connected manifold of area 1."""
-    exact = unfolded_part(surface, charts, config)
+    exact = unfolded_part(surface, charts, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
     many = len(surface.faces) > config.fine.above * config.fine.faces
     middle = thinned(surface, config.fine) if many else surface
-    whole = exact is not None and len(middle.faces) <= config.whole_faces
+    whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
     if not starts.late():
@@ -250,8 +260,8 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     begun += begun_searches(surface, graph, starts, starts.counts)
     if starts.small and min(search.energy() for search in begun) > config.most_excess:
         begun += begun_searches(surface, graph, starts, config.start.counts)
-    costs = [search.objective() for search in begun]
-    ahead = [search for search, cost in zip(begun, costs, strict=True) if cost <= config.start.behind * min(costs)]
+    by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
+    ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
     for search in ahead:
         search.finish(charts, config.few_rounds if starts.small else config.rounds, starts.late)
     return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
@@ -279,10 +289,11 @@ def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfi
     return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)
 
 
-def unfolded_part(surface: Surface, charts: int, config: FinishConfig) -> Solved | None:
+def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:
     """A part made of flat facets, unfolded: "unfolded" where that is the answer, "facets" where it is one among others.
 
-    None where too little of it is flat.
+    None where too little of it is flat.  A plate with more holes than charts were asked for can't do with those: the
+    side of each hole is one.
     """
     table = edge_table(surface.faces)
     region = flat_regions(surface, table, config.planar)
@@ -290,10 +301,10 @@ def unfolded_part(surface: Surface, charts: int, config: FinishConfig) -> Solved
     if count > config.planar.most:
         return None
     found = unfold(surface, table, region, config.planar)
-    if len(found) > config.planar.most_charts:
+    if len(found) > config.planar.most_charts + handles:
         return None
     faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
-    answer = len(found) <= min(config.planar.few, charts) or (faceted and len(found) <= charts)
+    answer = len(found) <= min(config.planar.few, charts) or (faceted and (len(found) <= charts or handles >= charts))
     pieces = [as_piece(surface, development) for development in found]
     if not all(is_valid(piece) for piece in pieces):
         return None

@@ -9,6 +9,7 @@ f faces · uv in the units of the surface.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -38,6 +39,21 @@ class Development:
     uv: NDArray[np.float64]
     perimeter: float
 
+    @cached_property
+    def box(self) -> NDArray[np.float64]:
+        """(2,) sides of its least rectangle, the longer first."""
+        return np.sort(least_rectangle(self.uv))[::-1]
+
+    @cached_property
+    def fill(self) -> float:
+        """Share of that rectangle that it covers."""
+        return float(np.abs(signed_areas(self.uv)).sum() / max(float(self.box.prod()), 1e-300))
+
+    @property
+    def aspect(self) -> float:
+        """Long side over short side of that rectangle."""
+        return float(self.box[0] / max(float(self.box[1]), 1e-300))
+
 
 class Hinge(NamedTuple):
     """How a second development joins a first: its uv once moved (m, 3, 2), and the edges (h,) that then coincide."""
@@ -54,6 +70,8 @@ class Unfolding:
         self.surface, self.table, self.config = surface, table, config
         ends = surface.vertices[table.edges]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.unit = float(np.sqrt(surface.face_areas().sum()))
+        self.normals = surface.face_normals()
         self.tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
         self.owner = region.copy()
         self.members = {number: self._flat(ids) for number, ids in enumerate(grouped(region))}
@@ -113,23 +131,31 @@ class Unfolding:
         )
         return hinge.length / shorter, hinge
 
+    def rolls_on(self, first: int, second: int, hinge: Hinge) -> bool:
+        """Whether two strips meet end to end on a rounded surface, as those of a coin's rim do."""
+        faces = self.normals[self.table.edge_faces[hinge.edges]]
+        if (np.einsum("ec,ec->e", faces[:, 0], faces[:, 1]) < np.cos(self.config.gentle)).any():
+            return False
+        return hinge.length >= self.config.whole_end * max(self.members[each].box[1] for each in (first, second))
+
     def joined(self, first: int, second: int, hinge: Hinge) -> Development | None:
         """Both as one development; None where it would overlap itself or sprawl."""
         a, b = self.members[first], self.members[second]
         uv = self._welded(a, b.ids, hinge)
-        both = np.concatenate([a.uv, uv])
-        if flipped_triangles(uv).any() or not self._is_compact(a, b, both, hinge) or self._overlap(a.uv, uv):
-            return None
-        ids = np.concatenate([a.ids, b.ids])
+        ids, both = np.concatenate([a.ids, b.ids]), np.concatenate([a.uv, uv])
         order = np.argsort(ids)
-        return Development(ids[order], both[order], a.perimeter + b.perimeter - 2.0 * hinge.length)
+        whole = Development(ids[order], both[order], a.perimeter + b.perimeter - 2.0 * hinge.length)
+        if flipped_triangles(uv).any() or not self._is_compact(a, b, whole, hinge) or self._overlap(a.uv, uv):
+            return None
+        return whole
 
-    def _is_compact(self, a: Development, b: Development, both: NDArray[np.float64], hinge: Hinge) -> bool:
-        """Whether the two joined, uv (m, 3, 2), pack well: no sprawl, no strip unless joined along long sides."""
-        longest = max(self.config.aspect, aspect(a.uv), aspect(b.uv)) * (1.0 + 1e-9)
+    def _is_compact(self, a: Development, b: Development, whole: Development, hinge: Hinge) -> bool:
+        """Whether the two joined pack well: no sprawl, no long strip unless joined along long sides."""
+        longest = max(self.config.aspect, a.aspect, b.aspect) * (1.0 + 1e-9)
         along = hinge.length >= self.config.long_side * min(a.perimeter, b.perimeter)
-        least = min(self.config.fill, fill(a.uv) * 0.999, fill(b.uv) * 0.999)  # slender triangles fill half of theirs
-        return fill(both) >= least and (along or aspect(both) <= longest)
+        short = float(whole.box[0]) <= self.config.span * self.unit
+        least = min(self.config.fill, a.fill * 0.999, b.fill * 0.999)  # slender triangles fill half of theirs
+        return whole.fill >= least and (along or short or whole.aspect <= longest)
 
     def _welded(self, a: Development, ids: NDArray[np.int64], hinge: Hinge) -> NDArray[np.float64]:
         """The moved uv with the ends of joined edges exactly where the first development has them."""
@@ -166,7 +192,7 @@ class Unfolding:
 def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig) -> list[Development]:
     """Flat regions (f,) joined into developments, the pair that shares most of its border first.
 
-    Two join where the shared edges are at least ``config.shared`` of the shorter border.
+    Two join where the shared edges are at least ``config.shared`` of the shorter border, or are the ends of two strips.
     """
     state = Unfolding(surface, table, region, config)
     around: dict[int, dict[int, NDArray[np.int64]]] = {number: {} for number in state.members}
@@ -194,8 +220,9 @@ def ranked(
     state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
 ) -> tuple[float, int, int] | None:
     """(−share of the shorter border, pair) of two developments that share enough of it, else None."""
-    share, _ = state.best_hinge(first, second, around[first][second])
-    return (-round(share, state.config.digits), first, second) if share >= state.config.shared else None
+    share, hinge = state.best_hinge(first, second, around[first][second])
+    enough = share >= state.config.shared or state.rolls_on(first, second, hinge)
+    return (-round(share, state.config.digits), first, second) if enough else None
 
 
 def combined(
@@ -240,14 +267,3 @@ def least_rectangle(uv: NDArray[np.float64]) -> NDArray[np.float64]:
     turn = np.stack([np.stack([np.cos(angle), np.sin(angle)], 1), np.stack([-np.sin(angle), np.cos(angle)], 1)], 1)
     boxes = np.ptp(np.einsum("sij,nj->sni", turn, hull), axis=1)
     return boxes[boxes.prod(axis=1).argmin()]
-
-
-def fill(uv: NDArray[np.float64]) -> float:
-    """Share of the least rectangle around triangles (m, 3, 2) that they cover."""
-    return float(np.abs(signed_areas(uv)).sum() / max(float(least_rectangle(uv).prod()), 1e-300))
-
-
-def aspect(uv: NDArray[np.float64]) -> float:
-    """Long side over short side of the least rectangle around triangles (m, 3, 2)."""
-    sides = least_rectangle(uv)
-    return float(sides.max() / max(float(sides.min()), 1e-300))

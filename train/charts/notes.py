@@ -22,7 +22,13 @@ def hurried(deadline: Deadline, late: Late) -> Iterator[str]:
 def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple[str, ...]:
     """What a user may not expect of the parts' charts, a sentence each."""
     found = []
-    many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts]
+    holed = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts and part.way == "unfolded"]
+    if holed:
+        found.append(
+            f"{len(holed)} of {len(solved)} different parts got more than {charts} charts (up to {max(holed)}): they are "
+            "laid out without stretch, and the side of each hole is a chart"
+        )
+    many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts and part.way != "unfolded"]
     if many:
         found.append(
             f"{len(many)} of {len(solved)} different parts got more than {charts} charts (up to {max(many)}), since "

@@ -10,7 +10,7 @@ import pytest
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths
-from flexpara.train.charts.develop import Development, Unfolding, fill, grouped, rigid_motion, unfold
+from flexpara.train.charts.develop import Development, Unfolding, grouped, rigid_motion, unfold
 from flexpara.train.charts.planar import flat_regions
 from flexpara.train.config import PlanarConfig
 
@@ -85,9 +85,9 @@ def test_segments_of_unequal_length_meet_at_their_midpoints() -> None:
 def test_a_square_fills_its_rectangle_and_a_triangle_half_of_it_however_turned() -> None:
     square = np.array([[[0.0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
     turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
-    assert fill(square) == pytest.approx(1.0)
-    assert fill(square @ turn.T + 7.0) == pytest.approx(1.0)
-    assert fill(square[:1] @ turn.T) == pytest.approx(0.5)
+    assert Development(np.arange(2), square, 4.0).fill == pytest.approx(1.0)
+    assert Development(np.arange(2), square @ turn.T + 7.0, 4.0).fill == pytest.approx(1.0)
+    assert Development(np.arange(1), square[:1] @ turn.T, 4.0).fill == pytest.approx(0.5)
 
 
 def test_rows_are_grouped_by_label() -> None:
@@ -110,7 +110,7 @@ def test_two_sides_of_a_cube_join_along_their_common_edge(solid: Callable[[str],
     whole = state.joined(first, second, hinge)
     assert whole is not None
     assert whole.perimeter == pytest.approx(6.0)
-    assert fill(whole.uv) == pytest.approx(1.0)
+    assert whole.fill == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", FACETED)
@@ -124,7 +124,7 @@ def test_an_unfolding_is_exact_and_valid_and_holds_each_face_once(name: str, sol
         assert not flipped_triangles(development.uv).any()
         assert len(overlapping_pairs(development.uv)) == 0
         assert (np.diff(development.ids) > 0).all()
-        assert fill(development.uv) >= CONFIG.fill
+        assert development.fill >= CONFIG.fill
 
 
 @pytest.mark.parametrize("name", FACETED)
@@ -177,7 +177,7 @@ def test_a_cube_becomes_a_cross_of_six_squares(solid: Callable[[str], Surface]) 
 def test_a_tube_becomes_a_rectangle_and_a_cone_a_sector(solid: Callable[[str], Surface]) -> None:
     (rectangle,) = developments(solid("tube"))
     chord = 16 * 2.0 * 0.5 * np.sin(np.pi / 16)
-    assert fill(rectangle.uv) == pytest.approx(1.0)
+    assert rectangle.fill == pytest.approx(1.0)
     assert rectangle.perimeter == pytest.approx(2.0 * (2.0 + chord))
     (sector,) = developments(solid("cone"))
     radius = np.linalg.norm(sector.uv.reshape(-1, 2) - apex_of(sector), axis=1).max()
@@ -197,7 +197,7 @@ def test_a_lid_keeps_off_the_rectangle_that_it_shares_too_little_with(solid: Cal
 
 def test_developments_that_would_sprawl_stay_apart(solid: Callable[[str], Surface]) -> None:
     whole = PlanarConfig(fill=0.99)
-    assert all(fill(d.uv) >= 0.99 for d in developments(solid("box"), whole))
+    assert all(d.fill >= 0.99 for d in developments(solid("box"), whole))
     assert len(developments(solid("box"), whole)) > 1
 
 
