@@ -59,7 +59,7 @@ class PlanarConfig:
 class SliverConfig:
     """Triangles thinner than the numbers that hold them."""
 
-    height: float = 3e-7
+    height: float = 1e-7
     """Least height of a triangle, as a share of its part's extent."""
     aspect: float = 1e-3
     """Height per longest side above which a triangle is small, not thin, and is left alone."""
