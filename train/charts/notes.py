@@ -25,8 +25,8 @@ def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple
     holed = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts and part.way == "unfolded"]
     if holed:
         found.append(
-            f"{len(holed)} of {len(solved)} different parts got more than {charts} charts (up to {max(holed)}): they are "
-            "laid out without stretch, and the side of each hole is a chart"
+            f"{len(holed)} of {len(solved)} different parts got more than {charts} charts (up to {max(holed)}): they "
+            "are laid out without stretch, and the side of each hole is a chart"
         )
     many = [len(part.pieces) for part in solved.values() if len(part.pieces) > charts and part.way != "unfolded"]
     if many:

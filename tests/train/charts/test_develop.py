@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import trimesh
 
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths
+from flexpara.runtime.mesh import Surface
 from flexpara.train.charts.develop import Development, Unfolding, grouped, rigid_motion, unfold
 from flexpara.train.charts.planar import flat_regions
 from flexpara.train.config import PlanarConfig
@@ -221,3 +223,11 @@ def test_stairs_whose_net_touches_itself_stay_valid_however_they_are_turned(
     found = developments(moved(solid("stairs"), seed=seed))
     assert len(found) <= 2
     assert all(len(overlapping_pairs(development.uv)) == 0 for development in found)
+
+
+def test_the_rims_of_a_washer_roll_on_until_they_no_longer_fit_the_page() -> None:
+    washer = trimesh.creation.annulus(0.3, 1.0, 0.2, sections=48)
+    surface = Surface(np.asarray(washer.vertices), np.asarray(washer.faces))
+    found = developments(surface)
+    # two rings, the inner rim in one strip, the outer, longer than the page, in two
+    assert sorted(len(each.ids) for each in found) == [32, 64, 96, 96, 96]
