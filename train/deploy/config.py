@@ -88,7 +88,7 @@ class FitConfig:
 class WrapConfig:
     """Their inverse: surface points for uv."""
 
-    samples: SampleConfig = field(default_factory=lambda: SampleConfig(even=100_000, beside=80_000))
+    samples: SampleConfig = field(default_factory=lambda: SampleConfig(even=100_000, beside=100_000))
     """What it is fitted to: the chart is given, so it takes fewer than the networks."""
     grow: GrowConfig = field(default_factory=lambda: GrowConfig(cells=10_000))
     """Its sizes; the grid lies in the atlas."""
