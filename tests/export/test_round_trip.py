@@ -100,7 +100,7 @@ def test_there_and_back_again(name: str, tmp_path: Path, request: pytest.Fixture
     }
     asset, charts = makers[name]()
     there, back, atlas, frame = both_ways(asset, charts, tmp_path)
-    agreement = inverse_agreement(back, asset.surface, atlas, count=5000)
+    agreement = inverse_agreement(back, asset.surface, atlas, count=50_000)
     assert agreement.rms < 2e-3
     assert agreement.p99 < 5e-3
     assert agreement.normal_mean < np.deg2rad(2.0)

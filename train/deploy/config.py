@@ -88,8 +88,9 @@ class FitConfig:
 class WrapConfig:
     """Their inverse: surface points for uv."""
 
-    samples: SampleConfig = field(default_factory=lambda: SampleConfig(even=100_000, beside=100_000))
-    """What it is fitted to: the chart is given, so it takes fewer than the networks."""
+    samples: SampleConfig = field(default_factory=lambda: SampleConfig(even=100_000, beside=80_000, reach=5e-4))
+    """What it is fitted to: the chart is given, so it takes fewer than the networks.  Those beside seams lie close to
+    them: of a chart that only touches a cell with a tip, something must be seen there."""
     grow: GrowConfig = field(default_factory=lambda: GrowConfig(cells=10_000))
     """Its sizes; the grid lies in the atlas."""
     tolerance: float = 1e-3
