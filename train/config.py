@@ -32,10 +32,8 @@ class PlanarConfig:
     """Long side over short side of a development that may be made of more compact ones."""
     span: float = 1.6
     """The same is allowed up to this length, as a multiple of √(surface area): such a strip fits on the page."""
-    gentle: float = 0.6
-    """Angle, in radians, up to which an edge between two strips belongs to a rounded surface."""
     whole_end: float = 0.9
-    """Share of the wider strip's end that such an edge must take up."""
+    """Two strips are joined end to end where they meet at so large a share of the wider one's end."""
     long_side: float = 0.4
     """Share of the shorter border from which two are joined along a long side: then a strip may come of it."""
     fill: float = 0.51

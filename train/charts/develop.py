@@ -71,7 +71,6 @@ class Unfolding:
         ends = surface.vertices[table.edges]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         self.unit = float(np.sqrt(surface.face_areas().sum()))
-        self.normals = surface.face_normals()
         self.tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
         self.owner = region.copy()
         self.members = {number: self._flat(ids) for number, ids in enumerate(grouped(region))}
@@ -132,10 +131,7 @@ class Unfolding:
         return hinge.length / shorter, hinge
 
     def rolls_on(self, first: int, second: int, hinge: Hinge) -> bool:
-        """Whether two strips meet end to end on a rounded surface, as those of a coin's rim do."""
-        faces = self.normals[self.table.edge_faces[hinge.edges]]
-        if (np.einsum("ec,ec->e", faces[:, 0], faces[:, 1]) < np.cos(self.config.gentle)).any():
-            return False
+        """Whether two strips meet end to end, as those of a coin's rim or of a gear's teeth do."""
         return hinge.length >= self.config.whole_end * max(self.members[each].box[1] for each in (first, second))
 
     def joined(self, first: int, second: int, hinge: Hinge) -> Development | None:
