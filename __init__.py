@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from .runtime.io.meshfile import load as load
     from .runtime.io.points.cloud import CloudMesh, PointCloud
     from .runtime.mesh import Asset, Atlas, Charts, Frame
-    from .runtime.options import Options, Outputs
-    from .runtime.packoptions import PackOptions as PackOptions
+    from .runtime.options.pack import PackOptions as PackOptions
+    from .runtime.options.unwrap import Options, Outputs
     from .runtime.progress import Progress
     from .runtime.sessions.session import UnwrapSession
     from .train.deploy.gated import GatedExperts
@@ -50,9 +50,9 @@ _HOME = {
     "Asset": "runtime.mesh",
     "Atlas": "runtime.mesh",
     "load": "runtime.io.meshfile",
-    "Options": "runtime.options",
-    "Outputs": "runtime.options",
-    "PackOptions": "runtime.packoptions",
+    "Options": "runtime.options.unwrap",
+    "Outputs": "runtime.options.unwrap",
+    "PackOptions": "runtime.options.pack",
     "pack": "bake.repack.repacked",
     "UnwrapSession": "runtime.sessions.session",
 }
@@ -88,8 +88,8 @@ def unwrap(
     from .runtime.deadline import Deadline
     from .runtime.io.anyfile import load_any
     from .runtime.io.points.cloud import PointCloud
-    from .runtime.keywords import from_keywords
-    from .runtime.options import Options, demand
+    from .runtime.options.keywords import from_keywords
+    from .runtime.options.unwrap import Options, demand
     from .runtime.progress import Clock
 
     options = from_keywords(Options, options, keywords)
@@ -109,8 +109,8 @@ def unwrap_pages(
     Args and raises: as `unwrap`; MissingDependencyError where flexpara[bake] is absent.
     """
     from .runtime.io.meshfile import load
-    from .runtime.keywords import from_keywords
-    from .runtime.options import Options
+    from .runtime.options.keywords import from_keywords
+    from .runtime.options.unwrap import Options
 
     options = from_keywords(Options, options, keywords)
     return unwrap_asset_pages(load(mesh, options.select), options, progress)

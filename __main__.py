@@ -29,7 +29,7 @@ from .runtime.deadline import Deadline, interrupts_ask
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.inputs import STREAM, from_stdin, meshes_of
-from .runtime.options import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
+from .runtime.options.unwrap import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
 from .runtime.progress import Clock
 from .runtime.runfile import Run
 

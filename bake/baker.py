@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.errors import InputError
-from ..runtime.keywords import from_keywords
+from ..runtime.options.keywords import from_keywords
 from .closing import ClosingConfig, closed_seams
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone

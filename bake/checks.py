@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..runtime.files import OutputFolder
-    from ..runtime.options import Outputs
+    from ..runtime.options.unwrap import Outputs
     from .bakemap import BakeMap
     from .files.exr import ExrSettings
     from .highpoly.highmaps import HighSource

@@ -12,7 +12,7 @@ from .. import __version__
 from ..runtime.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
-from ..runtime.options import (
+from ..runtime.options.unwrap import (
     AUTO,
     LAST_SET,
     AtlasOptions,
@@ -24,8 +24,8 @@ from ..runtime.options import (
     Seeded,
     demand,
 )
+from ..runtime.options.words import Paths
 from ..runtime.progress import Clock
-from ..runtime.words import Paths
 from .checks import check_outputs, chosen_maps, padding_of
 from .output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 

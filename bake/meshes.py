@@ -16,7 +16,7 @@ from ..runtime.io.gltf.instances import every_instance
 from ..runtime.io.loops import loops_of
 from ..runtime.io.npz import write_npz
 from ..runtime.material import used_materials
-from ..runtime.options import SCENES
+from ..runtime.options.unwrap import SCENES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
-    from ..runtime.options import Outputs
+    from ..runtime.options.unwrap import Outputs
     from .texture import Texture
 
 USD_KEYS = {"orm": "occlusionRoughnessMetallic"}

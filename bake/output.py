@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..runtime.errors import MissingDependencyError
 from ..runtime.io.loops import loops_of
-from ..runtime.options import POLYGONS
+from ..runtime.options.unwrap import POLYGONS
 from .checks import exr_settings
 from .meshes import MeshJob, write_meshes
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
-    from ..runtime.options import Outputs
+    from ..runtime.options.unwrap import Outputs
     from ..runtime.progress import Clock
     from .bakemap import BakeMap
     from .texture import Texture

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas
-    from ..runtime.options import Outputs
+    from ..runtime.options.unwrap import Outputs
     from ..runtime.progress import Clock
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.errors import InputError
-from ..runtime.keywords import from_keywords
+from ..runtime.options.keywords import from_keywords
 from .baker import bake
 from .files.images import write_texture
 from .files.textures import texture_names

@@ -1,6 +1,6 @@
 """Hooks of MkDocs: the tables of options are made from the classes that the command line is made from.
 
-`<!-- options: NAME -->` on a line of its own becomes the table of `NAME` of runtime/options.py and the like.
+`<!-- options: NAME -->` on a line of its own becomes the table of `NAME` of runtime/options/unwrap.py and the like.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-SOURCES = ("runtime/options.py", "runtime/packoptions.py", "runtime/console.py", "bake/commands.py")
+SOURCES = ("runtime/options/unwrap.py", "runtime/options/pack.py", "runtime/console.py", "bake/commands.py")
 PLACE = re.compile(r"^<!-- options: (\w+) -->$", re.MULTILINE)
 
 

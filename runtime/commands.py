@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from .console import show
 from .errors import InputError
-from .options import AtlasOptions, Flag, Output
+from .options.unwrap import AtlasOptions, Flag, Output
 
 SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
 

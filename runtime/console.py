@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from .errors import InputError
 from .extras import PACKAGE
-from .options import Flag
+from .options.unwrap import Flag
 from .progress import progress_bars, progress_lines
 
 if TYPE_CHECKING:

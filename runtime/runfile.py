@@ -14,7 +14,7 @@ from typing import Any
 
 from .errors import InputError, MissingFileError
 from .files import replace_file
-from .options import Options, Outputs
+from .options.unwrap import Options, Outputs
 
 FOLDER = ".checkpoint"
 NAME = "run.json"

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from .files import OutputFolder
     from .mesh import Asset
-    from .options import Outputs
+    from .options.unwrap import Outputs
     from .progress import Progress
 
 
@@ -44,8 +44,8 @@ class Saving(ABC):
             MissingDependencyError: the packages of flexpara[bake] are absent.
         """
         from .files import OutputFolder
-        from .keywords import from_keywords
-        from .options import Outputs
+        from .options.keywords import from_keywords
+        from .options.unwrap import Outputs
 
         outputs = from_keywords(Outputs, outputs, keywords)
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from flexpara.bake.commands import BakeOptions, HighOptions
-from flexpara.runtime.options import Options, Outputs
+from flexpara.runtime.options.unwrap import Options, Outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..runtime.io.points.cloud import CloudMesh, PointCloud
     from ..runtime.mesh import Asset
-    from ..runtime.options import TrainOptions
+    from ..runtime.options.unwrap import TrainOptions
     from ..runtime.progress import Clock
     from .pipeline import Trained
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.material import source_maps
-from ...runtime.options import AUTO
+from ...runtime.options.unwrap import AUTO
 from ..bakemap import BakeMap
 from ..maps.catalogue import HEIGHT, find_map
 from ..maps.normals import in_tangent_space, object_normal_map
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
-    from ...runtime.options import Outputs
+    from ...runtime.options.unwrap import Outputs
     from ..bakemap import Compute, NormalFormat
     from ..maps.rays import Progress
     from ..raster.gbuffer import GBuffer

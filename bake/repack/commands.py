@@ -12,8 +12,8 @@ from ...runtime.console import Console, Manners
 from ...runtime.errors import InputError
 from ...runtime.extras import requires
 from ...runtime.inputs import meshes_of
-from ...runtime.options import Output
-from ...runtime.packoptions import PackOptions, PackOutputs
+from ...runtime.options.pack import PackOptions, PackOutputs
+from ...runtime.options.unwrap import Output
 from ...runtime.progress import Clock
 from ..checks import padding_of
 

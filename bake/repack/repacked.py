@@ -11,10 +11,10 @@ import numpy as np
 from ... import __version__
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
-from ...runtime.keywords import from_keywords
+from ...runtime.options.keywords import from_keywords
+from ...runtime.options.pack import PackOptions, PackOutputs
 from ...runtime.pack.density import square_of
 from ...runtime.pack.repack import repack
-from ...runtime.packoptions import PackOptions, PackOutputs
 from ...runtime.progress import Clock
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..options import POLYGONS, SCENES
+from ..options.unwrap import POLYGONS, SCENES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ..mesh import Asset
-    from ..options import Outputs
+    from ..options.unwrap import Outputs
 
 UNSAID = frozenset({"welded_vertices", "unreferenced_vertices", "components"})
 WORDS = {

@@ -20,7 +20,7 @@ from .packing import Fitted, Packed, as_atlas, on_lattice, pack
 
 if TYPE_CHECKING:
     from ..mesh import Asset, Charts
-    from ..options import AtlasOptions
+    from ..options.unwrap import AtlasOptions
 
 
 class Square(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from flexpara.runtime.errors import InputError, MissingFileError
-from flexpara.runtime.options import Options, Outputs
+from flexpara.runtime.options.unwrap import Options, Outputs
 from flexpara.runtime.runfile import Run, find_run
 
 if TYPE_CHECKING:

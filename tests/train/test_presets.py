@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("torch")
 from flexpara.__main__ import main
 from flexpara.runtime.io.points.cloud import PointCloud
-from flexpara.runtime.options import ABLATIONS, TrainOptions
+from flexpara.runtime.options.unwrap import ABLATIONS, TrainOptions
 from flexpara.runtime.progress import Clock
 from flexpara.train import presets
 from flexpara.train.cloud.config import CloudConfig

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 from ...runtime.errors import InputError
-from ...runtime.options import PAPER_RANGES
+from ...runtime.options.unwrap import PAPER_RANGES
 
 Mode = Literal["global", "multi-chart"]
 PAPER_HIDDEN = 512

@@ -1,6 +1,6 @@
 """Kinds of options on the command line: several names in one word, an option given several times, a flag.
 
-Annotations are evaluated here, as in options.py.
+Annotations are evaluated here, as in unwrap.py.
 """
 
 from collections.abc import Sequence

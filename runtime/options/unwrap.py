@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .errors import InputError
+from ..errors import InputError
 from .words import Flag, Names
 
 if TYPE_CHECKING:
-    from .mesh import Asset
+    from ..mesh import Asset
 
 SIZES = (16, 16384)
 PRESETS = ("fast", "paper")
@@ -267,7 +267,7 @@ class Outputs(FileOptions, MapOptions):
 
         Raises: InputError for a map of textures that could not be read.
         """
-        from .material import refuse_unread, source_maps
+        from ..material import refuse_unread, source_maps
 
         auto = source_maps(asset) if self.uv_set is None else ()
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]

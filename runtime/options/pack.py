@@ -1,15 +1,15 @@
-"""What `flexpara pack` may be asked: see options.py, whose rules hold here too."""
+"""What `flexpara pack` may be asked: see unwrap.py, whose rules hold here too."""
 
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .options import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded, demand
+from .unwrap import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded, demand
 from .words import Flag, Names
 
 if TYPE_CHECKING:
-    from .mesh import Asset
+    from ..mesh import Asset
 
 OWN = "own"
 """Format of a file as it was given."""

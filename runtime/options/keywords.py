@@ -7,8 +7,8 @@ from difflib import get_close_matches
 from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from .errors import InputError
-from .options import demand
+from ..errors import InputError
+from .unwrap import demand
 from .words import names
 
 if TYPE_CHECKING:

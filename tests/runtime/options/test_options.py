@@ -14,10 +14,10 @@ import pytest
 from flexpara.bake.commands import BakeOptions, HighOptions
 from flexpara.runtime.console import Console
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.keywords import from_keywords
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Surface
-from flexpara.runtime.options import CheckpointOptions, Options, Outputs, TrainOptions
+from flexpara.runtime.options.keywords import from_keywords
+from flexpara.runtime.options.unwrap import CheckpointOptions, Options, Outputs, TrainOptions
 
 SURFACE = Surface(np.eye(3), np.array([[0, 1, 2]]))
 
