@@ -36,6 +36,9 @@ from .runtime.runfile import Run
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from .runtime.files import OutputFolder
+    from .runtime.mesh import Asset
+
 INTERRUPTED = 130
 TRAINED = "trained.safetensors"
 CHARTS = Parameter(name="*", group="Charts and atlas")
@@ -144,6 +147,19 @@ def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
     return padding_of(options.padding, outputs.target, options.size, light=outputs.uv_set is not None)
 
 
+def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
+    """Refuse before the work what writing would refuse after it.  Raises: as `check_outputs`, `check_pages`."""
+    outputs = run.outputs.for_asset(source)
+    check_outputs(folder, outputs, chosen_maps(outputs))
+    if run.options.atlas != SHARINGS[0]:
+        from .runtime.io.pages import pages_of
+
+        with requires("bake"):
+            from .bake.files.gltfmade import with_document
+            from .bake.pages import check_pages
+        check_pages(folder, run.outputs, pages_of(with_document(source), run.options.atlas))
+
+
 def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
@@ -157,11 +173,8 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
         source = load_any(run.mesh, run.options.select)
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
             if isinstance(source, Asset):
-                outputs = run.outputs.for_asset(source)
-                console.note_changes(source, lost(source, outputs))
-                check_outputs(folder, outputs, chosen_maps(outputs))
-                if run.options.atlas != SHARINGS[0]:
-                    outputs.for_pages()
+                console.note_changes(source, lost(source, run.outputs.for_asset(source)))
+                _check_files(run, folder, source)
             run.save()
             clock, ending = Clock(progress, deadline), nullcontext()
             if run.options.preset == "fast":  # preset paper has checkpoints

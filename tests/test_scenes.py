@@ -179,3 +179,22 @@ def test_several_atlases_want_a_format_that_holds_them(
     assert main(argv) == 2
     assert "several atlases with format obj, expected glb or gltf" in capsys.readouterr().err
     assert instant_training == []
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_a_foreign_texture_of_a_page_is_refused_before_the_work(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    argv = ["unwrap", str(scene), "-o", str(tmp_path / "out"), "--atlas", "material", "--maps", "ao", "--size", "64"]
+    assert main(argv) == 0
+    foreign = next((tmp_path / "out").glob("*_ao.png"))
+    kept = tmp_path / "other" / foreign.name
+    kept.parent.mkdir()
+    kept.write_bytes(b"somebody's")
+    monkeypatch.setattr("flexpara.__main__.unwrap_asset_pages", never)
+    assert main([*argv[:3], str(kept.parent), *argv[4:]]) == 2
+    assert foreign.name in capsys.readouterr().err
+    assert kept.read_bytes() == b"somebody's"
