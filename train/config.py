@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
 from .deploy.config import FitConfig, WrapConfig
-from .finish.config import SlitConfig
+from .finish.config import FlapConfig, SlitConfig
 
 
 @dataclass(frozen=True)
@@ -233,10 +233,8 @@ class FinishConfig:
     """Mean excess energy of a flattening that is not even tested for overlap."""
     bearable: float = 0.5
     """Mean excess energy above which a piece is cut before anything else."""
-    flaps: float = 0.02
-    """Share of a flattening that may lie over the rest of it and goes to the charts beside it."""
-    flap_edges: int = 4
-    """Edges at which such faces are tried to be put on, one at a time, where they do not fit at all of them."""
+    flaps: FlapConfig = field(default_factory=FlapConfig)
+    """Faces that lie over the rest of their chart."""
     bands: tuple[int, ...] = (2, 1)
     """Rings of faces beside a border that may change sides to make it shorter, in one pass after the other."""
     bands_carried: tuple[int, ...] = (1,)

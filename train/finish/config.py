@@ -18,6 +18,19 @@ class CotangentConfig:
 
 
 @dataclass(frozen=True)
+class FlapConfig:
+    """Faces that lie over the rest of their chart, and go to one beside it."""
+
+    most: float = 0.02
+    """Share of a flattening that may."""
+    edges: int = 4
+    """Edges at which they are tried to be put on, one at a time, where they do not fit at all of them."""
+    clear: float = 1e-6
+    """Distance between their points and others, as a share of the chart's extent: nearer ones could cross by a
+    rounding."""
+
+
+@dataclass(frozen=True)
 class ContactConfig:
     """Taking overlap inside a chart apart."""
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.geometry.topology import EdgeTable
+    from .config import FlapConfig
     from .pieces import Overlapping, Piece
 
 
@@ -86,24 +87,24 @@ def restricted(flat: Flat, rows: NDArray[np.int64]) -> Flat:
 
 
 def attached(
-    piece: Piece, surface: Surface, table: EdgeTable, flap: NDArray[np.int64], tries: int
+    piece: Piece, surface: Surface, table: EdgeTable, flap: NDArray[np.int64], config: FlapConfig
 ) -> tuple[NDArray[np.int64], Flat] | None:
     """The faces of a piece and a flap, and the flap laid beside the piece, face after face, at their own size.
 
     At first a flap is joined to all that it touches, its faces between others taking their corners; where that overlaps
-    or flips, along one edge alone, up to ``tries`` of them, longest first.  Nothing else moves.  None where no way is
-    valid.  table: of the surface.
+    or flips, along one edge alone, up to ``config.edges`` of them, longest first.  Nothing else moves.  None where no
+    way is valid.  table: of the surface.
     """
     edges = table.face_edges[flap]
     touching = np.isin(table.edge_faces[edges], piece.ids).any(axis=2)
     ends = surface.vertices[table.edges[edges]]
     length = np.where(touching, np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), 0.0)
-    longest = np.argsort(-length, axis=None, kind="stable")[: min(tries, int(touching.sum()))].tolist()
+    longest = np.argsort(-length, axis=None, kind="stable")[: min(config.edges, int(touching.sum()))].tolist()
     for only in [None, *edges.reshape(-1)[longest].tolist()]:
         layout = _Layout(piece, surface, table, only)
         order = layout.add_all(flap)
         flat = layout.flat()
-        if order is not None and is_valid(flat, len(order)) and are_clear(flat.uv, len(piece.flat.uv)):
+        if order is not None and is_valid(flat, len(order)) and are_clear(flat.uv, len(piece.flat.uv), config.clear):
             return np.concatenate([piece.ids, np.array(order, dtype=np.int64)]), flat
     return None
 
@@ -117,11 +118,11 @@ def is_valid(flat: Flat, fresh: int) -> bool:
     return not flipped_triangles(corners[-fresh:]).any() and not overlaps_anywhere(corners)
 
 
-def are_clear(uv: NDArray[np.float64], first: int) -> bool:
-    """True where no point from row ``first`` on lies upon an earlier one: such borders would cross by a rounding."""
+def are_clear(uv: NDArray[np.float64], first: int, clear: float) -> bool:
+    """True where no point from row ``first`` on lies upon an earlier one, up to a share ``clear`` of the extent."""
     extent = float(np.ptp(uv, axis=0).max())
     gaps = np.linalg.norm(uv[first:, None] - uv[None, :first], axis=2)
-    return bool((gaps > 1e-6 * extent).all())
+    return bool((gaps > clear * extent).all())
 
 
 class _Layout:

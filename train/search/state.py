@@ -86,7 +86,7 @@ class State:
 
     def trimmed(self, found: Overlapping) -> Trimmed | None:
         """A flattening less its flaps; None where they are too large, or the rest too stretched."""
-        less = trimmed(self.surface, found, self.area, self.config.flaps)
+        less = trimmed(self.surface, found, self.area, self.config.flaps.most)
         return less if less is not None and self.is_bearable(less.piece) else None
 
     def is_bearable(self, piece: Piece) -> bool:
@@ -153,7 +153,7 @@ class State:
         keys = np.flatnonzero(length > 0.0)
         for key in keys[np.lexsort((-length[keys], keys == label[owner]))].tolist():
             piece = self.pieces[key]
-            found = attached(piece, self.surface, self.table, flap, self.config.flap_edges)
+            found = attached(piece, self.surface, self.table, flap, self.config.flaps)
             wider = None if found is None else measured(self.surface, *found, self.area, piece.slits)
             if wider is not None and self.is_bearable(wider):
                 del self.pieces[key]  # under its key merges of the smaller piece are known

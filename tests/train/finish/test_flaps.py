@@ -8,6 +8,7 @@ import pytest
 from flexpara.runtime.geometry.overlap import overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
+from flexpara.train.finish.config import FlapConfig
 from flexpara.train.finish.flaps import are_clear, attached, flap_faces, restricted, trimmed
 from flexpara.train.finish.pieces import Overlapping, measured
 from flexpara.train.finish.slits import Flat
@@ -58,7 +59,7 @@ def test_a_part_of_a_flattening_stays_where_it_is() -> None:
 def test_a_flap_is_laid_beside_a_piece_at_its_own_size() -> None:
     table = edge_table(STRIP.faces)
     square = measured(STRIP, np.arange(2), restricted(layout(2.0 + STRIP.vertices[:, :2]), np.arange(2)), 2.0)
-    found = attached(square, STRIP, table, np.array([3, 2]), 4)
+    found = attached(square, STRIP, table, np.array([3, 2]), FlapConfig())
     assert found is not None
     ids, flat = found
     assert ids.tolist() == [0, 1, 2, 3]
@@ -69,7 +70,7 @@ def test_a_flap_is_laid_beside_a_piece_at_its_own_size() -> None:
 def test_a_flap_that_touches_nothing_is_not_attached() -> None:
     table = edge_table(STRIP.faces)
     one = measured(STRIP, np.array([0]), restricted(layout(STRIP.vertices[:, :2]), np.array([0])), 2.0)
-    assert attached(one, STRIP, table, np.array([3]), 4) is None
+    assert attached(one, STRIP, table, np.array([3]), FlapConfig()) is None
 
 
 @pytest.mark.parametrize("tries", [0, 3])
@@ -82,12 +83,12 @@ def test_where_a_flap_fits_at_one_edge_alone_it_is_put_there(tries: int) -> None
     uv = np.concatenate([moved, moved[[3]]])
     uv[[4, 5, 6]] -= [7.0, 0.0]
     piece = measured(STRIP, rows, Flat(Surface(points, faces), uv, {}), 2.0)
-    found = attached(piece, STRIP, edge_table(STRIP.faces), np.array([2]), tries)
+    found = attached(piece, STRIP, edge_table(STRIP.faces), np.array([2]), FlapConfig(edges=tries))
     assert (found is not None) == (tries > 0)
 
 
 def test_a_point_upon_another_is_not_clear_of_it() -> None:
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1e-9]])
-    assert not are_clear(uv, 3)
-    assert are_clear(uv[:3], 2)
-    assert are_clear(uv[:3], 3)
+    assert not are_clear(uv, 3, 1e-6)
+    assert are_clear(uv[:3], 2, 1e-6)
+    assert are_clear(uv[:3], 3, 1e-6)
