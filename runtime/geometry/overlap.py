@@ -147,10 +147,12 @@ def _candidate_pairs(triangles: NDArray[np.float64]) -> Iterator[NDArray[np.int6
     """Blocks (p, 2) of the pairs of triangles (f, 3, 2) whose bounding boxes overlap, each pair once.
 
     A hierarchy of grids: a triangle lives on the level whose cells are just larger than its box, so it covers at most
-    four cells there and on each coarser level; two triangles meet on the level of the larger one.
+    four cells there and on each coarser level; two triangles meet on the level of the larger one.  Across the main
+    direction of all edges they must overlap too: the boxes of needles that lie aslant side by side all do.
     """
     if len(triangles) < 2:
         return
+    near, far = _across_main_direction(triangles)
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     origin = low.min(axis=0)
     coarsest = int(np.frexp((high.max(axis=0) - origin).max())[1])
@@ -161,7 +163,21 @@ def _candidate_pairs(triangles: NDArray[np.float64]) -> Iterator[NDArray[np.int6
             keep = (level[a] < current) | (a < b)
             a, b = a[keep], b[keep]
             meet = np.all((low[a] < high[b]) & (low[b] < high[a]), axis=1)
+            meet &= (near[a] <= far[b]) & (near[b] <= far[a])
             yield np.stack([a[meet], b[meet]], axis=1)
+
+
+def _across_main_direction(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(f,) least and greatest coordinate across the direction of most edge length, no less apart than without rounding.
+
+    Of triangles (f, 3, 2).
+    """
+    edges = (np.roll(triangles, -1, axis=1) - triangles).reshape(-1, 2)
+    edges /= max(float(np.abs(edges).max()), 1e-300)
+    across = np.linalg.eigh(edges.T @ edges)[1][:, 0]
+    place = triangles @ across
+    slack = 8.0 * _HALF_ULP * float(np.abs(triangles).max())
+    return place.min(axis=1) - slack, place.max(axis=1) + slack
 
 
 def _grid_pairs(

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 TEXELS = 1024.0
 SEAM_REACH = 12.0
 """A point this close to a seam (texels at 1024²) may be taken for one on its other side."""
+SEAM_POINTS = 128
+"""Points of seams, a texel apart, that are looked at for it: a wire thinner than a texel has thousands that near."""
 
 
 class PointMap(Protocol):
@@ -101,7 +103,8 @@ def across_a_seam(
 ) -> NDArray[np.bool_]:
     """(n,) bool: the answer uv (n, 2) fits a seam point near the point (n, 3) twice as well as that point.
 
-    Near: within SEAM_REACH texels in space.  error (n,): distance of the answer from the point's own uv, texels.
+    Near: of the nearest SEAM_POINTS those within SEAM_REACH texels in space.  error (n,): distance of the answer from
+    the point's own uv, texels.
     """
     if len(points) == 0:
         return np.zeros(0, dtype=bool)
@@ -116,11 +119,14 @@ def across_a_seam(
     t = ((np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)) / np.repeat(steps, steps))[:, None]
     seam = ends[edge, 0] * (1.0 - t) + ends[edge, 1] * t
     seam_uv = ends_uv[edge, 0] * (1.0 - t) + ends_uv[edge, 1] * t
-    near = KDTree(seam).query_ball_point(points, SEAM_REACH * texel)
-    gaps = (
-        np.linalg.norm(seam_uv[index] - uv, axis=1).min(initial=np.inf) for index, uv in zip(near, answer, strict=True)
-    )
-    return np.fromiter(gaps, dtype=np.float64, count=len(points)) * TEXELS < 0.5 * error
+    if len(seam) == 0:
+        return np.zeros(len(points), dtype=bool)
+    reach = SEAM_REACH * texel
+    _, near = KDTree(seam).query(points, k=min(SEAM_POINTS, len(seam)), distance_upper_bound=reach)
+    nowhere = np.full((1, 2), np.inf)  # what the tree answers where fewer are near
+    beside = np.concatenate([seam_uv, nowhere])[near.reshape(len(points), -1)]
+    gap = np.linalg.norm(beside - answer[:, None], axis=2).min(axis=1)
+    return gap * TEXELS < 0.5 * error
 
 
 def surface_points(

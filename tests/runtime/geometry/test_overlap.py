@@ -157,3 +157,14 @@ def test_a_flat_projection_of_bunny_agrees_with_lagrange(models: Path) -> None:
     assert len(pairs) > 100
     assert np.array_equal(overlapping_pairs(front), pairs)
     assert overlap_area(front, pairs) == pytest.approx(area, rel=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 0.75, 2.0])
+def test_of_needles_side_by_side_those_that_overlap_are_found_however_they_lie(turn: float) -> None:
+    row = np.arange(40.0)[:, None, None] * [0.0, 1e-3]
+    needles = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1e-3]]) + row
+    needles[7, 2] += [0.0, 0.5e-3]  # its tip lies in the needle beside it
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    pairs = overlapping_pairs(needles @ rotation.T).tolist()
+    assert [7, 8] in pairs
+    assert all(second - first == 1 for first, second in pairs)
