@@ -11,6 +11,7 @@ from ...runtime.geometry.topology import edge_table
 from ..finish.pieces import Overlapping, Piece
 from ..search.labels import border_lengths, connected_pieces, dual_graph, smooth_labels
 from ..search.search import Search
+from ..workers import parallel_map
 from .layout import carried_uv, features
 
 if TYPE_CHECKING:
@@ -37,17 +38,22 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
 
 
 def laid_on(search: Search, piece: NDArray[np.int64], label: NDArray[np.int64], sources: list[Piece]) -> Search:
-    """The search with the faces (f,) of each piece laid out like the source that most of their labels (f,) name."""
-    for number in range(int(piece.max()) + 1):
-        ids = np.flatnonzero(piece == number)
-        carry_piece(search, ids, sources[int(np.bincount(label[ids]).argmax())], search.config)
+    """The search with the faces (f,) of each piece laid out like the source that most of their labels (f,) name.
+
+    A source of the same surface whose faces are the piece's is taken as it is.
+    """
+    rows = [np.flatnonzero(piece == number) for number in range(int(piece.max()) + 1)]
+    jobs = [(ids, sources[int(np.bincount(label[ids]).argmax())]) for ids in rows]
+    for (ids, source), ways in zip(jobs, parallel_map(lambda job: carried_ways(search, *job), jobs), strict=True):
+        carry_piece(search, ids, source, ways)
     search.place_loose()
     return search
 
 
-def carry_piece(search: Search, ids: NDArray[np.int64], source: Piece, config: FinishConfig, depth: int = 0) -> None:
+def carry_piece(
+    search: Search, ids: NDArray[np.int64], source: Piece, ways: list[Piece | Overlapping | None], depth: int = 0
+) -> None:
     """Add a chart of the proxy on the faces ids (m,), less its flaps; where more overlaps there, cut between it."""
-    ways = carried_ways(search, ids, source, config.carry)
     valid = [way for way in ways if isinstance(way, Piece)]
     best = min(valid, key=lambda piece: piece.energy, default=None)
     overlapping = [way for way in ways if isinstance(way, Overlapping)]
@@ -56,20 +62,21 @@ def carry_piece(search: Search, ids: NDArray[np.int64], source: Piece, config: F
         search.add(best)
     elif less is not None:
         search.add_trimmed(less)
-    elif overlapping and depth < config.halvings:
+    elif overlapping and depth < search.config.halvings:
         for part in search.cut(ids, overlapping[0]):
-            carry_piece(search, part, source, config, depth + 1)
+            carry_piece(search, part, source, carried_ways(search, part, source), depth + 1)
     else:
         search.add_valid(ids, source.slits)
 
 
-def carried_ways(
-    search: Search, ids: NDArray[np.int64], source: Piece, config: CarryConfig
-) -> list[Piece | Overlapping | None]:
+def carried_ways(search: Search, ids: NDArray[np.int64], source: Piece) -> list[Piece | Overlapping | None]:
     """A chart of the proxy on the faces ids (m,): laid out as there, anew with its slits, or with slits of its own.
 
     Ends with the first of these that stretches about as little as the proxy's chart.
     """
+    if is_the_same(search.surface, ids, source):
+        return [source]
+    config = search.config.carry
     enough = config.worse * source.energy + config.slack * float(search.areas[ids].sum()) / search.area
     found: list[Piece | Overlapping | None] = []
     for slits, start in (
@@ -81,6 +88,12 @@ def carried_ways(
         if isinstance(found[-1], Piece) and found[-1].energy <= enough:
             break
     return found
+
+
+def is_the_same(surface: Surface, ids: NDArray[np.int64], source: Piece) -> bool:
+    """True where a source consists of the faces ids (m,) of this very surface."""
+    here = np.array_equal(ids, np.sort(source.ids))
+    return here and np.array_equal(surface.triangles[source.ids], source.flat.surface.triangles)
 
 
 def votes(coarse: Surface, label: NDArray[np.int64], surface: Surface, config: CarryConfig) -> NDArray[np.float64]:

@@ -262,25 +262,29 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
         begun += begun_searches(surface, graph, starts, config.start.counts)
     by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
     ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
-    for search in ahead:
-        search.finish(charts, config.few_rounds if starts.small else config.rounds, starts.late)
+    rounds = config.few_rounds if starts.small else config.rounds
+    ahead = parallel_map(lambda search: search.finish(charts, rounds, starts.late), ahead)
     return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
 
 
 def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:
-    """A search from each start, as far as merges pay."""
-    found = []
-    for label in starts.labels(surface, graph, counts):
-        search = Search(surface, graph, starts.config)
-        for piece in range(int(label.max()) + 1):
-            search.add_valid(np.flatnonzero(label == piece))
-        crowded = len(search.pieces) > starts.config.start.crowded
-        search.begin(starts.late)
-        found.append(search)
-        # a search of so many pieces takes its time; another start would not be much better
-        if crowded or starts.late():
-            break
-    return found
+    """A search from each start, as far as merges pay; one alone where the first has so many pieces that it takes time:
+    another would not be much better.
+    """
+    labels = list(starts.labels(surface, graph, counts))
+    first = laid_out(surface, graph, labels[0], starts.config)
+    if starts.late() or len(first.pieces) > starts.config.start.crowded:
+        return [first.begin(starts.late)]
+    begun = [lambda: first, *(partial(laid_out, surface, graph, label, starts.config) for label in labels[1:])]
+    return parallel_map(lambda begin: begin().begin(starts.late), begun)
+
+
+def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
+    """A search of the pieces that labels (f,) name."""
+    search = Search(surface, graph, config)
+    for piece in range(int(label.max()) + 1):
+        search.add_valid(np.flatnonzero(label == piece))
+    return search
 
 
 def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:

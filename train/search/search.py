@@ -22,6 +22,8 @@ from .foretold import Foretold
 from .state import Pair, State
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
@@ -154,15 +156,16 @@ class Search(State):
         ways = [kept, self.trimmed(relaxed), self.less_flaps(self.try_piece(ids))]
         return min((way for way in ways if way is not None), key=self.cost)
 
-    def begin(self, late: Late = never) -> None:
-        """Split what is stretched, and merge while that pays, unless it is ``late``."""
+    def begin(self, late: Late = never) -> Self:
+        """The search after splits of what is stretched, and merges while those pay, unless it is ``late``."""
         self.place_loose()
         if not late():
             self.split_stretched()
         self.merge(0.0, 0, late)
+        return self
 
-    def finish(self, most: int, rounds: int, late: Late = never) -> None:
-        """Merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
+    def finish(self, most: int, rounds: int, late: Late = never) -> Self:
+        """The search after it: merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
 
         Once it is ``late``, only what the limits on pieces and stretch ask for.
         """
@@ -171,6 +174,7 @@ class Search(State):
             if late() or len(self.settled) >= self.config.vain_splits or not self.improve(most):
                 break
         self.split_down()
+        return self
 
     def merge(self, least: float, down_to: int, late: Late = never) -> None:
         """Merges that gain more than ``least``, while there are more than ``down_to`` pieces and it is not ``late``."""
