@@ -51,6 +51,10 @@ class PlanarConfig:
     allowed."""
     flat_share: float = 0.6
     """The same for flat regions per face: a mesh whose faces lie mostly in common planes is made of facets."""
+    bent: float = 1e-3
+    """Angle defect, in radians, from which a vertex can't lie inside a flat chart."""
+    dear: float = 0.02
+    """What the seams through all bent vertices cost at least, above which a part not made of facets is not unfolded."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Surface
     from ..config import CarryConfig, FinishConfig
     from ..search.labels import DualGraph
+
+WALL = 1e6
+"""Cost of a label that a face may not take."""
 
 
 def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:
@@ -106,18 +110,25 @@ def votes(coarse: Surface, label: NDArray[np.int64], surface: Surface, config: C
 def smoothed_in_band(
     share: NDArray[np.float64], areas: NDArray[np.float64], graph: DualGraph, config: FinishConfig
 ) -> NDArray[np.int64]:
-    """Labels (f,) of short borders, from the share of votes (f, k); only faces near a border may change theirs."""
-    label = share.argmax(axis=1)
-    near = share.max(axis=1) < 1.0
-    i, j = graph.pairs.T
-    for _ in range(config.carry.band):
-        touched = (label[i] != label[j]) | near[i] | near[j]
-        near = near.copy()
-        near[i[touched]] = True
-        near[j[touched]] = True
+    """Labels (f,) of short borders, from the share of votes (f, k).
+
+    A face may take the labels that were voted for within a few rings of it, which away from borders is its own alone.
+    """
     doubt = -np.log(np.maximum(share, 1e-3)) * areas[:, None] / config.labels.smoothing
-    doubt[~near] = np.where(np.arange(share.shape[1])[None] == label[~near, None], 0.0, 1e6)
+    doubt[~within_reach(share > 0.0, graph, config.carry.band)] = WALL
     return smooth_labels(doubt, graph)
+
+
+def within_reach(marked: NDArray[np.bool_], graph: DualGraph, rings: int) -> NDArray[np.bool_]:
+    """(f, k) bool: what is marked at a face, or at another within so many rings of it."""
+    count = len(marked)
+    pairs = np.concatenate([graph.pairs, graph.pairs[:, ::-1], np.repeat(np.arange(count)[:, None], 2, axis=1)])
+    links = sparse.csr_array((np.ones(len(pairs), dtype=np.int32), tuple(pairs.T)), shape=(count, count))
+    found = sparse.csr_array(marked.astype(np.int32))
+    for _ in range(rings):
+        found = links @ found
+        found.data[:] = 1
+    return found.toarray() > 0
 
 
 def fragments_joined(

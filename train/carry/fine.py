@@ -28,7 +28,7 @@ from ..finish.pieces import Piece, extract, measured, try_piece
 from ..finish.slits import Flat
 from ..finish.twolevel import TwoLevel
 from ..search.labels import dual_graph
-from ..search.search import Search
+from ..search.state import State
 from ..workers import parallel_map
 from .carry import fragments_joined, smoothed_in_band, votes
 from .layout import carried_jacobians
@@ -57,15 +57,11 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
     total = float(areas.sum())
     found = parallel_map(lambda number: refined_piece(surface, groups[number], sources[number], total, config), order)
-    search = None
-    for number, pieces_of in zip(order, found, strict=True):
-        if pieces_of:
-            continue
-        search = search or Search(surface, graph, config)
-        search.add_valid(groups[number], sources[number].slits)
-    if search is not None:
-        search.place_loose()
-    return [piece for of_one in found for piece in of_one] + ([] if search is None else list(search.pieces.values()))
+    failed = [number for number, of_one in zip(order, found, strict=True) if not of_one]
+    anew = State(surface, graph, config) if failed else None
+    if anew is not None:
+        anew.add_all_valid([(groups[number], sources[number].slits) for number in failed])
+    return [piece for of_one in found for piece in of_one] + ([] if anew is None else list(anew.pieces.values()))
 
 
 def refined_piece(

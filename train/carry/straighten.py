@@ -12,7 +12,7 @@ import numpy as np
 
 from ..search.labels import smooth_labels
 from ..search.search import Search
-from .carry import fragments_joined, laid_on
+from .carry import WALL, fragments_joined, laid_on, within_reach
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,14 +38,7 @@ def straightened(search: Search, bands: tuple[int, ...]) -> Search:
 
 def shortest_borders(label: NDArray[np.int64], graph: DualGraph, rings: int) -> NDArray[np.int64]:
     """Labels (f,) of least border, where a face may take any label found within so many rings of it."""
-    allowed = np.zeros((len(label), int(label.max()) + 1), dtype=bool)
-    allowed[np.arange(len(label)), label] = True
-    i, j = graph.pairs.T
-    for _ in range(rings):
-        wider = allowed.copy()
-        np.logical_or.at(wider, i, allowed[j])
-        np.logical_or.at(wider, j, allowed[i])
-        allowed = wider
-    doubt = np.where(allowed, 1e-9, 1e6)
+    own = label[:, None] == np.arange(int(label.max()) + 1)
+    doubt = np.where(within_reach(own, graph, rings), 1e-9, WALL)
     doubt[np.arange(len(label)), label] = 0.0  # of equal borders, the one that is there
     return smooth_labels(doubt, graph)

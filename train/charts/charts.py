@@ -30,7 +30,7 @@ from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
 from .notes import hurried, notes
 from .parts import Part, split_parts
-from .planar import flat_regions
+from .planar import flat_regions, least_seam
 from .proof import all_proven, is_valid
 from .slivers import steadied
 
@@ -268,8 +268,9 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
 
 
 def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:
-    """A search from each start, as far as merges pay; one alone where the first has so many pieces that it takes time:
-    another would not be much better.
+    """A search from each start, as far as merges pay.
+
+    Where the first has so many pieces that it takes its time, it is the only one: another would not be much better.
     """
     labels = list(starts.labels(surface, graph, counts))
     first = laid_out(surface, graph, labels[0], starts.config)
@@ -282,8 +283,7 @@ def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: t
 def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
     """A search of the pieces that labels (f,) name."""
     search = Search(surface, graph, config)
-    for piece in range(int(label.max()) + 1):
-        search.add_valid(np.flatnonzero(label == piece))
+    search.add_all_valid([(np.flatnonzero(label == piece), ()) for piece in range(int(label.max()) + 1)])
     return search
 
 
@@ -302,12 +302,13 @@ def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishCon
     table = edge_table(surface.faces)
     region = flat_regions(surface, table, config.planar)
     count = int(region.max()) + 1
-    if count > config.planar.most:
+    faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
+    dear = config.slit.price * least_seam(surface, table, config.planar.bent) > config.planar.dear
+    if count > config.planar.most or (dear and not faceted):
         return None
     found = unfold(surface, table, region, config.planar)
     if len(found) > config.planar.most_charts + handles:
         return None
-    faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
     answer = len(found) <= min(config.planar.few, charts) or (faceted and (len(found) <= charts or handles >= charts))
     pieces = [as_piece(surface, development) for development in found]
     if not all(is_valid(piece) for piece in pieces):

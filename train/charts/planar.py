@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.geometry.topology import face_components
+from ...runtime.geometry.triangles import corner_angles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,3 +89,20 @@ def plane_of(surface: Surface, ids: NDArray[np.int64]) -> Plane:
     first = first - (first @ normal) * normal
     first /= max(float(np.linalg.norm(first)), 1e-300)
     return Plane(corner[0, 0], np.stack([first, np.cross(normal, first)]))
+
+
+def least_seam(surface: Surface, table: EdgeTable, bent: float) -> float:
+    """A lower bound on the seams of any charts without stretch, in √(area): each bent vertex lies on one.
+
+    Bent is a vertex inside the surface whose corners add up to 2π by no better than ``bent`` radians.
+    """
+    count = len(surface.vertices)
+    turn = np.bincount(surface.faces.reshape(-1), corner_angles(surface.triangles).reshape(-1), minlength=count)
+    ends = surface.vertices[table.edges]
+    shortest = np.full(count, np.inf)
+    np.minimum.at(shortest, table.edges, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None])
+    inside = np.isfinite(shortest)
+    inside[table.edges[~table.manifold]] = False
+    return float(
+        shortest[inside & (np.abs(turn - 2.0 * np.pi) > bent)].sum() / 2.0 / np.sqrt(surface.face_areas().sum())
+    )

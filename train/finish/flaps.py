@@ -110,12 +110,14 @@ def attached(
 
 
 def is_valid(flat: Flat, fresh: int) -> bool:
-    """True where the last ``fresh`` faces of a flattening are not flipped, and no two faces overlap.
+    """True where the last ``fresh`` faces of a flattening are not flipped, and overlap none.
 
-    All faces are tested: a flap may lie over the inside of a piece without crossing its border.
+    All faces near them are tested: a flap may lie over the inside of a piece without crossing its border.
     """
     corners = flat.uv[flat.surface.faces]
-    return not flipped_triangles(corners[-fresh:]).any() and not overlaps_anywhere(corners)
+    lowest, highest = corners[-fresh:].min(axis=(0, 1)), corners[-fresh:].max(axis=(0, 1))
+    near = (corners.max(axis=1) >= lowest).all(axis=1) & (corners.min(axis=1) <= highest).all(axis=1)
+    return not flipped_triangles(corners[-fresh:]).any() and not overlaps_anywhere(corners[near])
 
 
 def are_clear(uv: NDArray[np.float64], first: int, clear: float) -> bool:
@@ -126,22 +128,23 @@ def are_clear(uv: NDArray[np.float64], first: int, clear: float) -> bool:
 
 
 class _Layout:
-    """A flattening that grows face by face: corners (m, 3) of each face as rows of points in space and in the plane.
+    """Faces of a flap laid beside a piece, one by one: corners of each as rows of points in space and in the plane.
 
-    only: the one edge at which it may grow beyond the piece, or None for all.
+    only: the one edge at which they may touch the piece, or None for all.
     """
 
     def __init__(self, piece: Piece, surface: Surface, table: EdgeTable, only: int | None) -> None:
-        self.surface, self.table, self.only = surface, table, only
-        self.row = {face: row for row, face in enumerate(piece.ids.tolist())}
-        self.faces = piece.flat.surface.faces.tolist()
-        self.laid = len(self.faces)
-        self.points = [piece.flat.surface.vertices]
-        self.uv = piece.flat.uv.tolist()
+        self.piece, self.surface, self.table, self.only = piece, surface, table, only
+        self.uv: list[list[float]] = []
+        self.faces: list[list[int]] = []
         self.more: list[int] = []
+        self.row: dict[int, int] = {}
+        """Of each face of the flap that is laid out, and of those of the piece beside it."""
 
     def add_all(self, flap: NDArray[np.int64]) -> list[int] | None:
         """Lay all faces of a flap out, those with most neighbours first; their order, None where one has none."""
+        beside = np.flatnonzero(np.isin(self.piece.ids, self.table.edge_faces[self.table.face_edges[flap]]))
+        self.row = dict(zip(self.piece.ids[beside].tolist(), beside.tolist(), strict=True))
         left, order = set(flap.tolist()), []
         while left:
             glued = {face: self.neighbours(face) for face in sorted(left)}
@@ -153,16 +156,26 @@ class _Layout:
             order.append(face)
         return order
 
+    def corners(self, row: int) -> list[int]:
+        """The three points of a face laid out."""
+        laid = self.piece.flat.surface.faces
+        return laid[row].tolist() if row < len(laid) else self.faces[row - len(laid)]
+
+    def place(self, point: int) -> list[float]:
+        """A point in the plane."""
+        laid = self.piece.flat.uv
+        return laid[point].tolist() if point < len(laid) else self.uv[point - len(laid)]
+
     def neighbours(self, face: int) -> list[tuple[int, int, int]]:
         """(corner, and the points that this corner and the next one would take) for each edge at a face laid out."""
         found = []
         for corner, edge in enumerate(self.table.face_edges[face].tolist()):
-            rows = [self.row[other] for other in self.table.edge_faces[edge].tolist() if other in self.row]
-            if not rows or (rows[0] < self.laid and self.only not in (None, edge)):
+            other = next((other for other in self.table.edge_faces[edge].tolist() if other in self.row), None)
+            of_piece = other is not None and self.row[other] < len(self.piece.ids)
+            if other is None or (of_piece and self.only not in (None, edge)):
                 continue
             a, b = self.surface.faces[face, [corner, (corner + 1) % 3]].tolist()
-            other = next(f for f in self.table.edge_faces[edge].tolist() if f in self.row)
-            ends, mine = self.surface.faces[other].tolist(), self.faces[rows[0]]
+            ends, mine = self.surface.faces[other].tolist(), self.corners(self.row[other])
             found.append((corner, mine[ends.index(a)], mine[ends.index(b)]))
         return found
 
@@ -173,10 +186,10 @@ class _Layout:
             corners[corner], corners[(corner + 1) % 3] = first, second
         if -1 in corners:
             free = corners.index(-1)
-            corners[free] = len(self.uv)
+            corners[free] = len(self.piece.flat.uv) + len(self.uv)
             self.uv.append(self._apex(face, free, corners[(free + 1) % 3], corners[(free + 2) % 3]))
             self.more.append(int(self.surface.faces[face, free]))
-        self.row[face] = len(self.faces)
+        self.row[face] = len(self.piece.ids) + len(self.faces)
         self.faces.append(corners)
 
     def _apex(self, face: int, free: int, first: int, second: int) -> list[float]:
@@ -186,11 +199,13 @@ class _Layout:
         length = max(float(along @ along), 1e-300)
         t = float((apex - a) @ along) / length
         height = float(np.linalg.norm(apex - a - t * along)) / np.sqrt(length)
-        (ax, ay), (bx, by) = self.uv[first], self.uv[second]
+        (ax, ay), (bx, by) = self.place(first), self.place(second)
         dx, dy = bx - ax, by - ay
         return [ax + t * dx - height * dy, ay + t * dy + height * dx]
 
     def flat(self) -> Flat:
-        """What was laid out."""
-        points = np.concatenate([self.points[0], self.surface.vertices[self.more]])
-        return Flat(Surface(points, np.array(self.faces, dtype=np.int64)), np.array(self.uv), {})
+        """The piece with what was laid out."""
+        laid = self.piece.flat
+        points = np.concatenate([laid.surface.vertices, self.surface.vertices[self.more]])
+        faces = np.concatenate([laid.surface.faces, np.array(self.faces, dtype=np.int64).reshape(-1, 3)])
+        return Flat(Surface(points, faces), np.concatenate([laid.uv, np.reshape(self.uv, (-1, 2))]), {})

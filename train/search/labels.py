@@ -53,9 +53,13 @@ def smooth_labels(unary: NDArray[np.float64], graph: DualGraph, *, sweeps: int =
     """Labels (f,) of low energy by α-expansion (Boykov, Veksler & Zabih 2001); unary (f, k) costs in lengths."""
     label = unary.argmin(axis=1)
     energy = label_energy(label, unary, graph)
+    reach = sum(np.bincount(end, graph.cost, minlength=len(label)) for end in graph.pairs.T)
     for _ in range(sweeps):
         for alpha in range(unary.shape[1]):
-            moved = expand_label(label, alpha, unary, graph)
+            free = (label != alpha) & (unary[np.arange(len(label)), label] - unary[:, alpha] + reach > 0.0)
+            if not free.any():
+                continue
+            moved = expand_label(label, alpha, unary, graph, free)
             moved_energy = label_energy(moved, unary, graph)
             if moved_energy < energy:
                 label, energy = moved, moved_energy
@@ -63,53 +67,46 @@ def smooth_labels(unary: NDArray[np.float64], graph: DualGraph, *, sweeps: int =
 
 
 def expand_label(
-    label: NDArray[np.int64], alpha: int, unary: NDArray[np.float64], graph: DualGraph
+    label: NDArray[np.int64], alpha: int, unary: NDArray[np.float64], graph: DualGraph, free: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """The best labelling in which each face keeps its label or takes ``alpha``: one minimum cut.
 
-    Only faces that could gain take part; the others are walls that keep their label.
+    free: (f,) bool, the faces that take part; the others are walls that keep their label.
     """
-    faces = np.arange(len(label))
-    gain = unary[faces, label] - unary[:, alpha]
-    i, j = graph.pairs.T
-    reach = np.zeros(len(label))
-    np.add.at(reach, i, graph.cost)
-    np.add.at(reach, j, graph.cost)
-    free = (label != alpha) & (gain + reach > 0.0)
-    if not free.any():
-        return label
-    keep, take = unary[faces, label].copy(), unary[:, alpha].copy()
-    both = free[i] & free[j]
+    rows = np.flatnonzero(free)
+    number = np.cumsum(free) - 1
+    keep, take = unary[rows, label[rows]], unary[rows, alpha]
+    touched = free[graph.pairs].any(axis=1)
+    (i, j), cost = graph.pairs[touched].T, graph.cost[touched]
     for a, b in ((i, j), (j, i)):
         one = free[a] & ~free[b]
-        np.add.at(keep, a[one], graph.cost[one] * (label[a[one]] != label[b[one]]))
-        np.add.at(take, a[one], graph.cost[one] * (label[b[one]] != alpha))
-    cut = i[both], j[both], graph.cost[both]
-    apart = cut[2] * (label[cut[0]] != label[cut[1]])
+        at, wall, price = number[a[one]], label[b[one]], cost[one]
+        keep += np.bincount(at, price * (label[a[one]] != wall), minlength=len(rows))
+        take += np.bincount(at, price * (wall != alpha), minlength=len(rows))
+    both = free[i] & free[j]
+    i, j, cost = i[both], j[both], cost[both]
+    apart = cost * (label[i] != label[j])
     # E(0,0) = apart, E(0,1) = E(1,0) = cost, E(1,1) = 0, as unary terms plus one directed edge
-    np.add.at(take, cut[0], cut[2] - apart)
-    np.add.at(take, cut[1], -cut[2])
-    take_side = minimum_cut(keep[free], take[free], cut, free, 2.0 * cut[2] - apart)
+    take += np.bincount(number[i], cost - apart, minlength=len(rows))
+    take -= np.bincount(number[j], cost, minlength=len(rows))
     moved = label.copy()
-    moved[np.flatnonzero(free)[take_side]] = alpha
+    moved[rows[minimum_cut(keep, take, (number[i], number[j]), 2.0 * cost - apart)]] = alpha
     return moved
 
 
 def minimum_cut(
     keep: NDArray[np.float64],
     take: NDArray[np.float64],
-    edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
-    free: NDArray[np.bool_],
+    edges: tuple[NDArray[np.int64], NDArray[np.int64]],
     capacity: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Which free faces switch (m,): least Σ keep/take costs + Σ capacity where only the second switches."""
-    number = np.cumsum(free) - 1
+    """Which faces switch (m,): least Σ keep/take costs + Σ capacity of the edges where only the second switches."""
     size = len(keep)
     source, sink = size, size + 1
     base = np.minimum(keep, take)
     node = np.arange(size)
-    rows = np.concatenate([np.full(size, source), node, number[edges[0]]])
-    cols = np.concatenate([node, np.full(size, sink), number[edges[1]]])
+    rows = np.concatenate([np.full(size, source), node, edges[0]])
+    cols = np.concatenate([node, np.full(size, sink), edges[1]])
     # cut source→node when the node switches (pays take), node→sink when it keeps (pays keep)
     costs = np.concatenate([take - base, keep - base, capacity])
     scale = 1e5 / max(costs.max(), 1e-30)

@@ -157,7 +157,7 @@ class Search(State):
         return min((way for way in ways if way is not None), key=self.cost)
 
     def begin(self, late: Late = never) -> Self:
-        """The search after splits of what is stretched, and merges while those pay, unless it is ``late``."""
+        """Split what is stretched, and merge while that pays, unless it is ``late``; the search itself is returned."""
         self.place_loose()
         if not late():
             self.split_stretched()
@@ -165,9 +165,9 @@ class Search(State):
         return self
 
     def finish(self, most: int, rounds: int, late: Late = never) -> Self:
-        """The search after it: merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
+        """Merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
 
-        Once it is ``late``, only what the limits on pieces and stretch ask for.
+        The search itself is returned.  Once it is ``late``, only what the limits on pieces and stretch ask for.
         """
         self.merge_down(most)
         for _ in range(rounds):

@@ -5,7 +5,8 @@ Objective: Σ area · excess + price · (seams + slits).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from copy import copy
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ...runtime.geometry.topology import edge_table
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.flaps import Trimmed, attached, trimmed
 from ..finish.pieces import Overlapping, Piece, measured, try_piece
+from ..workers import parallel_map
 from .cuts import Links, cut_between, halves, overlap_sides
 from .labels import DualGraph, border_lengths
 
@@ -30,6 +32,13 @@ if TYPE_CHECKING:
 Pair = tuple[int, int]
 
 
+class Loose(NamedTuple):
+    """A flap (n,) without a piece yet, and a face of the piece that it came from."""
+
+    flap: NDArray[np.int64]
+    owner: int
+
+
 class State:
     """Valid pieces by key; a key is never used twice."""
 
@@ -42,8 +51,7 @@ class State:
         self.centroids = surface.triangles.mean(axis=1)
         self.table = edge_table(surface.faces)
         self.pieces: dict[int, Piece] = {}
-        self.loose: list[tuple[NDArray[np.int64], int]] = []
-        """Flaps without a piece yet, and a face of the piece that each came from."""
+        self.loose: list[Loose] = []
         self._next = 0
 
     def add(self, piece: Piece) -> int:
@@ -79,10 +87,25 @@ class State:
             for part in self.cut(ids, found):
                 self.add_valid(part, (), depth + 1)
 
+    def add_all_valid(self, jobs: list[tuple[NDArray[np.int64], tuple[Slit, ...]]]) -> None:
+        """Faces and slits, each as one valid piece or several, found side by side; then a place for all flaps."""
+
+        def found(job: tuple[NDArray[np.int64], tuple[Slit, ...]]) -> tuple[list[Piece], list[Loose]]:
+            alone = copy(self)
+            alone.pieces, alone.loose = {}, []
+            alone.add_valid(*job)
+            return list(alone.pieces.values()), alone.loose
+
+        for pieces, loose in parallel_map(found, jobs):
+            for piece in pieces:
+                self.add(piece)
+            self.loose += loose
+        self.place_loose()
+
     def add_trimmed(self, found: Trimmed) -> None:
         """Take a piece in, and keep its flaps for ``place_loose``."""
         self.add(found.piece)
-        self.loose += [(flap, int(found.piece.ids[0])) for flap in found.flaps]
+        self.loose += [Loose(flap, int(found.piece.ids[0])) for flap in found.flaps]
 
     def trimmed(self, found: Overlapping) -> Trimmed | None:
         """A flattening less its flaps; None where they are too large, or the rest too stretched."""

@@ -15,8 +15,11 @@ from flexpara.runtime.samples import make_sample
 from flexpara.train.carry.carry import (
     carried_back,
     fragments_joined,
+    is_the_same,
+    laid_on,
     smoothed_in_band,
     votes,
+    within_reach,
 )
 from flexpara.train.carry.layout import carried_uv, face_frames, turned_into
 from flexpara.train.carry.proxy import simplified
@@ -161,3 +164,27 @@ def test_a_search_on_the_proxy_comes_back_with_its_charts_and_about_its_energy()
     covered = np.sort(np.concatenate([piece.ids for piece in back.pieces.values()]))
     assert np.array_equal(covered, np.arange(len(sphere.faces)))
     assert back.energy() == pytest.approx(found.energy(), abs=0.01)
+
+
+def test_a_mark_reaches_one_face_farther_with_each_ring() -> None:
+    chain = DualGraph(np.array([[0, 1], [1, 2], [3, 2]]), np.ones(3), np.ones(3))
+    marked = np.array([[True, False], [False, False], [False, False], [False, True]])
+    reached = [[True, False], [True, False], [False, True], [False, True]]
+    assert within_reach(marked, chain, 0).tolist() == marked.tolist()
+    assert within_reach(marked, chain, 1).tolist() == reached
+    assert within_reach(marked, chain, 3).all()
+
+
+def test_a_chart_of_the_same_faces_is_taken_as_it_is() -> None:
+    surface = unit("sphere", 8)
+    graph = dual_graph(surface, edge_table(surface.faces), SeamPrices())
+    label = (surface.triangles.mean(axis=1)[:, 0] > 0.0).astype(np.int64)
+    search = Search(surface, graph, CONFIG)
+    search.add_all_valid([(np.flatnonzero(label == number), ()) for number in range(2)])
+    pieces = list(search.pieces.values())
+    again = laid_on(Search(surface, graph, CONFIG), label, label, pieces)
+    assert [np.array_equal(a.flat.uv, b.flat.uv) for a, b in zip(pieces, again.pieces.values(), strict=True)] == [
+        True
+    ] * 2
+    larger = Surface(2.0 * surface.vertices, surface.faces)
+    assert not is_the_same(larger, np.flatnonzero(label == 0), pieces[0])

@@ -11,7 +11,7 @@ from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths, signed_areas
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.charts.planar import deviations, flat_regions, heights, plane_of
+from flexpara.train.charts.planar import deviations, flat_regions, heights, least_seam, plane_of
 from flexpara.train.config import PlanarConfig
 
 if TYPE_CHECKING:
@@ -108,3 +108,17 @@ def test_the_plane_of_a_facet_keeps_lengths_and_is_seen_from_outside(solid: Call
         uv = plane_of(box, ids).project(box.triangles[ids].reshape(-1, 3)).reshape(-1, 3, 2)
         np.testing.assert_allclose(edge_lengths(uv), edge_lengths(box.triangles[ids]), atol=1e-12)
         assert (signed_areas(uv) > 0.0).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 7.0])
+def test_each_corner_of_a_cube_lies_on_a_seam_of_half_its_shortest_edge_or_more(size: float) -> None:
+    vertices, faces = make_sample("cube", resolution=4)
+    cube = Surface(size * vertices, faces)
+    shortest = float(edge_lengths(cube.triangles).min())
+    least = 8 * shortest / 2 / np.sqrt(cube.face_areas().sum())
+    assert least_seam(cube, edge_table(faces), CONFIG.bent) == pytest.approx(least)
+
+
+def test_a_tube_needs_no_seam_by_its_bends() -> None:
+    tube = Surface(*make_sample("tube", resolution=24))
+    assert least_seam(tube, edge_table(tube.faces), CONFIG.bent) == 0.0

@@ -94,7 +94,7 @@ def test_an_expansion_is_the_best_of_all_subsets(seed: int) -> None:
     rng = np.random.default_rng(seed)
     graph, unary = random_graph(rng, 9, 16), rng.uniform(0.0, 1.5, (9, 4))
     label = rng.integers(0, 4, 9)
-    moved = expand_label(label, 2, unary, graph)
+    moved = expand_label(label, 2, unary, graph, label != 2)
     assert ((moved == label) | (moved == 2)).all()
     best = least_energy([(int(old), 2) for old in label], unary, graph)
     assert label_energy(moved, unary, graph) == pytest.approx(best, abs=1e-3)
@@ -122,7 +122,7 @@ def test_no_expansion_raises_the_energy_on_a_sphere() -> None:
     label = unary.argmin(axis=1)
     start = energy = label_energy(label, unary, graph)
     for alpha in range(5):
-        label = expand_label(label, alpha, unary, graph)
+        label = expand_label(label, alpha, unary, graph, label != alpha)
         moved = label_energy(label, unary, graph)
         assert moved <= energy + 1e-4 * start
         energy = moved
@@ -193,6 +193,6 @@ def test_labels_are_not_written_to() -> None:
     label = np.random.default_rng(0).integers(0, 3, len(sphere.faces))
     unary, before = np.zeros((len(label), 3)), label.copy()
     graph = graph_of(sphere)
-    expand_label(label, 0, unary, graph)
+    expand_label(label, 0, unary, graph, label != 0)
     islets_joined(label, sphere.face_areas(), graph, CONFIG)
     assert np.array_equal(label, before)
