@@ -126,7 +126,7 @@ def within_reach(marked: NDArray[np.bool_], graph: DualGraph, rings: int) -> NDA
     links = sparse.csr_array((np.ones(len(pairs), dtype=np.int32), tuple(pairs.T)), shape=(count, count))
     found = sparse.csr_array(marked.astype(np.int32))
     for _ in range(rings):
-        found = links @ found
+        found = sparse.csr_array(links @ found)
         found.data[:] = 1
     return found.toarray() > 0
 

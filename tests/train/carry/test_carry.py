@@ -182,9 +182,7 @@ def test_a_chart_of_the_same_faces_is_taken_as_it_is() -> None:
     search = Search(surface, graph, CONFIG)
     search.add_all_valid([(np.flatnonzero(label == number), ()) for number in range(2)])
     pieces = list(search.pieces.values())
-    again = laid_on(Search(surface, graph, CONFIG), label, label, pieces)
-    assert [np.array_equal(a.flat.uv, b.flat.uv) for a, b in zip(pieces, again.pieces.values(), strict=True)] == [
-        True
-    ] * 2
+    again = laid_on(Search(surface, graph, CONFIG), label, label, pieces).pieces.values()
+    assert all(np.array_equal(one.flat.uv, other.flat.uv) for one, other in zip(pieces, again, strict=True))
     larger = Surface(2.0 * surface.vertices, surface.faces)
     assert not is_the_same(larger, np.flatnonzero(label == 0), pieces[0])
