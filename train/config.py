@@ -70,6 +70,18 @@ class SliverConfig:
 
 
 @dataclass(frozen=True)
+class ShortenConfig:
+    """Charts too long for a page, cut across.  Lengths are shares of √(surface area)."""
+
+    above: float = 2.5
+    """Length above which a chart is cut: laid along the diagonal, it asks for a page of which a third is covered."""
+    to: float = 1.15
+    """Length of the parts it is cut in."""
+    shift: float = 0.25
+    """How far a cut may move along the chart to run where edges are shorter, as a share of a part's length."""
+
+
+@dataclass(frozen=True)
 class LabelConfig:
     """From chart probabilities to face labels."""
 
@@ -209,6 +221,8 @@ class FinishConfig:
     """Flat regions, and unfolding them."""
     start: StartConfig = field(default_factory=StartConfig)
     """First labels of the searches."""
+    shorten: ShortenConfig = field(default_factory=ShortenConfig)
+    """Charts too long for a page."""
     sliver: SliverConfig = field(default_factory=SliverConfig)
     """Triangles thinner than the numbers that hold them."""
     congruence: float = 1e-5

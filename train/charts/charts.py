@@ -7,14 +7,13 @@ f faces · a part has area 1.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
-from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
+from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
 from ..carry.carry import carried_back
 from ..carry.fine import refined
@@ -23,27 +22,23 @@ from ..carry.straighten import straightened
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
-from ..search.labels import dual_graph
-from ..search.search import Search
-from ..search.starts import clusters, pieces_by_score
 from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
 from .notes import hurried, notes
+from .objective import objective, rank
 from .parts import Part, split_parts
 from .planar import flat_regions, least_seam
 from .proof import all_proven, is_valid
+from .shorten import shortened
 from .slivers import steadied
+from .starts import Starts, best_search
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from numpy.typing import NDArray
-
+    from ...runtime.deadline import Late
     from ...runtime.progress import Stages
     from ..config import FinishConfig
-    from ..search.labels import DualGraph
-
-    Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    from ..search.search import Search
+    from .starts import Scores
 
 
 class Finished(NamedTuple):
@@ -94,7 +89,9 @@ def chart_surface(
     def solve(number: int) -> Solved:
         part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
         starts = Starts(part, charts, part.scale**2 / total, config, seed, scores, late)
-        return solve_part(part.surface, charts, starts, config)
+        solved = solve_part(part.surface, charts, starts, config)
+        page = float(np.sqrt(total)) / part.scale
+        return solved._replace(pieces=shortened(part.surface, solved.pieces, page, charts, config))
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
@@ -136,76 +133,6 @@ def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
     )
 
 
-def objective(surface: Surface, pieces: list[Piece], price: float) -> float:
-    """Σ energy + price · (seams + slits), lengths in √(area of the surface)."""
-    label = np.zeros(len(surface.faces), dtype=np.int64)
-    for number, piece in enumerate(pieces):
-        label[piece.ids] = number
-    table = edge_table(surface.faces)
-    seam = table.manifold & (label[table.edge_faces[:, 0]] != label[table.edge_faces[:, 1]])
-    ends = surface.vertices[table.edges[seam]]
-    border = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / np.sqrt(surface.face_areas().sum()))
-    return sum(piece.cost(price) for piece in pieces) + price * border
-
-
-@dataclass(frozen=True)
-class Starts:
-    """Where the searches of a part begin.  share: of the whole surface's area, which decides how long is searched."""
-
-    part: Part
-    charts: int
-    share: float
-    config: FinishConfig
-    seed: int
-    scores: Scores | None
-    late: Late = never
-
-    @property
-    def faces(self) -> int:
-        """Faces of the proxy."""
-        most = self.config.proxy_faces
-        plain = int(np.clip(most * np.sqrt(self.share), min(self.config.fewest_faces, most), most))
-        return max(plain, self.config.faces_per_handle * self.handles)
-
-    @property
-    def whole(self) -> int:
-        """Faces up to which a part that unfolds is searched as it is."""
-        return max(round(self.config.whole_faces * np.sqrt(self.share)), self.faces)
-
-    @cached_property
-    def handles(self) -> int:
-        """The genus of the part."""
-        faces = self.part.surface.faces
-        return max((2 - len(boundary_loops(faces)) - euler_characteristic(faces)) // 2, 0)
-
-    @property
-    def small(self) -> bool:
-        """Whether the part is a small share of the surface."""
-        return self.share < self.config.start.worth
-
-    @property
-    def counts(self) -> tuple[float, ...]:
-        """Clusters of each start, as a multiple of the charts asked for."""
-        start = self.config.start
-        if self.handles > start.handles:
-            return start.counts_holed
-        if self.small:
-            return start.counts_small
-        return start.counts if self.share >= start.main else start.counts_middle
-
-    def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
-        """Connected pieces (f,), numbered 0…, of the proxy, one start after the other."""
-        config = self.config
-        if self.scores is not None:
-            points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
-            yield pieces_by_score(self.scores(points), surface.face_areas(), graph, config.labels)
-            return
-        for number, each in enumerate(counts):
-            wanted = max(round(each * self.charts), round(self.handles / config.handles_per_cluster), 1)
-            count = min(wanted, max(len(surface.faces) // config.start.least_faces, 1))
-            yield clusters(surface, graph, count, config, np.random.default_rng([self.seed, number]))
-
-
 def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
     """Charts of a connected manifold of area 1."""
     exact = unfolded_part(surface, charts, starts.handles, config)
@@ -245,52 +172,6 @@ def brought_back(
     found.mend()
     pieces = list(found.pieces.values())
     return pieces if middle is surface else refined(surface, middle, pieces, config)
-
-
-def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
-    """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
-    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
-    begun = []
-    if unfolded:
-        search = Search(surface, graph, config)
-        for piece in unfolded:
-            search.add(piece)
-        search.begin(starts.late)
-        begun.append(search)
-    begun += begun_searches(surface, graph, starts, starts.counts)
-    if starts.small and min(search.energy() for search in begun) > config.most_excess:
-        begun += begun_searches(surface, graph, starts, config.start.counts)
-    by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
-    ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
-    rounds = config.few_rounds if starts.small else config.rounds
-    ahead = parallel_map(lambda search: search.finish(charts, rounds, starts.late), ahead)
-    return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
-
-
-def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:
-    """A search from each start, as far as merges pay.
-
-    Where the first has so many pieces that it takes its time, it is the only one: another would not be much better.
-    """
-    labels = list(starts.labels(surface, graph, counts))
-    first = laid_out(surface, graph, labels[0], starts.config)
-    if starts.late() or len(first.pieces) > starts.config.start.crowded:
-        return [first.begin(starts.late)]
-    begun = [lambda: first, *(partial(laid_out, surface, graph, label, starts.config) for label in labels[1:])]
-    return parallel_map(lambda begin: begin().begin(starts.late), begun)
-
-
-def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
-    """A search of the pieces that labels (f,) name."""
-    search = Search(surface, graph, config)
-    search.add_all_valid([(np.flatnonzero(label == piece), ()) for piece in range(int(label.max()) + 1)])
-    return search
-
-
-def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
-    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
-    energy = sum(piece.energy for piece in pieces)
-    return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)
 
 
 def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:

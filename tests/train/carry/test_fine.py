@@ -20,7 +20,8 @@ from flexpara.train.carry.fine import bounded, laid_out, refined, rotations, wei
 from flexpara.train.carry.layout import nearest_faces
 from flexpara.train.carry.proxy import thinned
 from flexpara.train.charts import charts
-from flexpara.train.charts.charts import chart_surface, objective
+from flexpara.train.charts.charts import chart_surface
+from flexpara.train.charts.objective import objective
 from flexpara.train.config import FineConfig, FinishConfig
 from flexpara.train.finish.arap import RigidSteps, nearest_rotations
 from flexpara.train.finish.contact import boundary_edges, rim_faces

@@ -19,7 +19,8 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts import charts as module
-from flexpara.train.charts.charts import Finished, chart_surface, objective
+from flexpara.train.charts.charts import Finished, chart_surface
+from flexpara.train.charts.objective import objective
 from flexpara.train.charts.proof import verify
 from flexpara.train.config import FinishConfig, StartConfig
 from flexpara.train.finish.flatten import jacobians

@@ -1,0 +1,32 @@
+"""What charts of a surface cost, and which of two sets of them is better."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.geometry.topology import edge_table
+
+if TYPE_CHECKING:
+    from ...runtime.mesh import Surface
+    from ..config import FinishConfig
+    from ..finish.pieces import Piece
+
+
+def objective(surface: Surface, pieces: list[Piece], price: float) -> float:
+    """Σ energy + price · (seams + slits), lengths in √(area of the surface)."""
+    label = np.zeros(len(surface.faces), dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        label[piece.ids] = number
+    table = edge_table(surface.faces)
+    seam = table.manifold & (label[table.edge_faces[:, 0]] != label[table.edge_faces[:, 1]])
+    ends = surface.vertices[table.edges[seam]]
+    border = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / np.sqrt(surface.face_areas().sum()))
+    return sum(piece.cost(price) for piece in pieces) + price * border
+
+
+def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
+    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
+    energy = sum(piece.energy for piece in pieces)
+    return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)

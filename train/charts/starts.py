@@ -1,0 +1,128 @@
+"""Where the searches of a part begin, how many there are, and the best of them.   f faces · a part has area 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.deadline import Late, never
+from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
+from ..search.labels import dual_graph
+from ..search.search import Search
+from ..search.starts import clusters, pieces_by_score
+from ..workers import parallel_map
+from .objective import rank
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Surface
+    from ..config import FinishConfig
+    from ..finish.pieces import Piece
+    from ..search.labels import DualGraph
+    from .parts import Part
+
+    Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where the searches of a part begin.  share: of the whole surface's area, which decides how long is searched."""
+
+    part: Part
+    charts: int
+    share: float
+    config: FinishConfig
+    seed: int
+    scores: Scores | None
+    late: Late = never
+
+    @property
+    def faces(self) -> int:
+        """Faces of the proxy."""
+        most = self.config.proxy_faces
+        plain = int(np.clip(most * np.sqrt(self.share), min(self.config.fewest_faces, most), most))
+        return max(plain, self.config.faces_per_handle * self.handles)
+
+    @property
+    def whole(self) -> int:
+        """Faces up to which a part that unfolds is searched as it is."""
+        return max(round(self.config.whole_faces * np.sqrt(self.share)), self.faces)
+
+    @cached_property
+    def handles(self) -> int:
+        """The genus of the part."""
+        faces = self.part.surface.faces
+        return max((2 - len(boundary_loops(faces)) - euler_characteristic(faces)) // 2, 0)
+
+    @property
+    def small(self) -> bool:
+        """Whether the part is a small share of the surface."""
+        return self.share < self.config.start.worth
+
+    @property
+    def counts(self) -> tuple[float, ...]:
+        """Clusters of each start, as a multiple of the charts asked for."""
+        start = self.config.start
+        if self.handles > start.handles:
+            return start.counts_holed
+        if self.small:
+            return start.counts_small
+        return start.counts if self.share >= start.main else start.counts_middle
+
+    def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
+        """Connected pieces (f,), numbered 0…, of the proxy, one start after the other."""
+        config = self.config
+        if self.scores is not None:
+            points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
+            yield pieces_by_score(self.scores(points), surface.face_areas(), graph, config.labels)
+            return
+        for number, each in enumerate(counts):
+            wanted = max(round(each * self.charts), round(self.handles / config.handles_per_cluster), 1)
+            count = min(wanted, max(len(surface.faces) // config.start.least_faces, 1))
+            yield clusters(surface, graph, count, config, np.random.default_rng([self.seed, number]))
+
+
+def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
+    """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
+    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
+    begun = []
+    if unfolded:
+        search = Search(surface, graph, config)
+        for piece in unfolded:
+            search.add(piece)
+        search.begin(starts.late)
+        begun.append(search)
+    begun += begun_searches(surface, graph, starts, starts.counts)
+    if starts.small and min(search.energy() for search in begun) > config.most_excess:
+        begun += begun_searches(surface, graph, starts, config.start.counts)
+    by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
+    ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
+    rounds = config.few_rounds if starts.small else config.rounds
+    ahead = parallel_map(lambda search: search.finish(charts, rounds, starts.late), ahead)
+    return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
+
+
+def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:
+    """A search from each start, as far as merges pay.
+
+    Where the first has so many pieces that it takes its time, it is the only one: another would not be much better.
+    """
+    labels = list(starts.labels(surface, graph, counts))
+    first = laid_out(surface, graph, labels[0], starts.config)
+    if starts.late() or len(first.pieces) > starts.config.start.crowded:
+        return [first.begin(starts.late)]
+    begun = [lambda: first, *(partial(laid_out, surface, graph, label, starts.config) for label in labels[1:])]
+    return parallel_map(lambda begin: begin().begin(starts.late), begun)
+
+
+def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
+    """A search of the pieces that labels (f,) name."""
+    search = Search(surface, graph, config)
+    search.add_all_valid([(np.flatnonzero(label == piece), ()) for piece in range(int(label.max()) + 1)])
+    return search
