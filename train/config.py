@@ -287,7 +287,7 @@ class FinishConfig:
     """Share of the smaller border that two pieces must share to be worth a merge."""
     small: float = 0.03
     """Share of the surface under which a piece is small: a merge across a short border is tried too."""
-    slit_above: float = 0.02
+    slit_above: float = 0.003
     """Excess energy over which a finished piece is slit once more, with contacts."""
 
 
