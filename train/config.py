@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from ..runtime.geometry.cutgraph import SeamPrices
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import FlapConfig, SlitConfig
+from .seams.config import ClosingConfig
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,8 @@ class CarryConfig:
     """Mean excess energy added to that."""
     islet: float = 0.001
     """Share of a part below which a fragment of a label joins a neighbour."""
+    winding: float = 1.4
+    """Length of a seam, as a multiple of its ends' distance, above which it is led along in parts."""
     rigid_steps: int = 4
     """Steps of as-rigid-as-possible flattening from the proxy's rotations."""
 
@@ -215,6 +218,10 @@ class SplitConfig:
 class FinishConfig:
     """From labels to valid charts."""
 
+    stretch: float = 0.0
+    """Mean excess energy that each part may have for the sake of short seams; 0: the price of slits decides alone."""
+    closing: ClosingConfig = field(default_factory=ClosingConfig)
+    """How seams are closed."""
     labels: LabelConfig = field(default_factory=LabelConfig)
     slit: SlitConfig = field(default_factory=SlitConfig)
     planar: PlanarConfig = field(default_factory=PlanarConfig)

@@ -43,7 +43,7 @@ def train_asset(
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
     if options.preset != "paper":
-        return train(asset.surface, TrainConfig(charts=options.charts, seed=options.seed), clock, clock.deadline)
+        return train(asset.surface, fast_config(options), clock, clock.deadline)
     with requires("train"):
         from .paper.batches import PaperInput
         from .paper.checkpoint import Checkpoints
@@ -71,6 +71,14 @@ def train_cloud(
     return mesh, replace(trained, settings={**trained.settings, "cloud": asdict(config)})
 
 
+def fast_config(options: TrainOptions) -> TrainConfig:
+    """The settings of preset fast that these options ask for."""
+    plain = TrainConfig(charts=options.most_charts, seed=options.seed)
+    stretch = 0.0 if options.max_stretch is None else options.max_stretch - 1.0
+    slit = replace(plain.finish.slit, price=options.seam_price)
+    return replace(plain, finish=replace(plain.finish, slit=slit, stretch=stretch))
+
+
 def paper_config(options: TrainOptions) -> PaperConfig:
     """The settings of preset paper that these options ask for."""
     plain = PaperConfig()
@@ -78,7 +86,7 @@ def paper_config(options: TrainOptions) -> PaperConfig:
     return replace(
         plain,
         mode=options.mode,
-        charts=options.charts,
+        charts=options.most_charts,
         seed=options.seed,
         steps=options.steps or plain.steps,
         points=options.points or plain.points,

@@ -8,8 +8,8 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import InputError
-from .unwrap import demand
-from .words import names
+from .seams import AUTO
+from .words import demand, names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,6 +42,6 @@ def _as_field(name: str, default: object, value: Any) -> Any:
         return names(value) if isinstance(value, str) else tuple(value)
     plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
     plain = float(plain) if type(plain) is int and isinstance(default, float) else plain
-    fits = default is None or type(plain) is type(default)
+    fits = default is None or type(plain) is type(default) or (name, plain) == ("charts", AUTO)
     demand(fits, f"{name} is {value!r}, expected a value like {default!r}; pass one of type {type(default).__name__}")
     return plain

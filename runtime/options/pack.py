@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .unwrap import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded, demand
-from .words import Flag, Names
+from .unwrap import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded
+from .words import Flag, Names, demand
 
 if TYPE_CHECKING:
     from ..mesh import Asset

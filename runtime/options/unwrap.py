@@ -8,15 +8,15 @@ Annotations are evaluated here, unlike in other modules: cyclopts reads those of
 """
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError
-from .words import Flag, Names
+from .seams import AUTO as AUTO
+from .seams import SeamOptions
+from .words import Flag, Names, demand, demand_known
 
 if TYPE_CHECKING:
     from ..mesh import Asset
@@ -36,7 +36,8 @@ POLYGONS = ("obj", "ply", "usda")
 LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
-AUTO = "auto"
+FAST_ALONE = ("seam_price", "max_stretch")
+"""Options that preset paper has no use for."""
 LAST_SET = 7
 """Of uv sets that programs read."""
 
@@ -103,11 +104,9 @@ class PaperOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChartOptions(SourceOptions):
+class ChartOptions(SeamOptions, SourceOptions):
     """What is asked of the charts, and how they are found."""
 
-    charts: int = 8
-    """The most charts that each connected part of the surface may get."""
     preset: Literal["fast", "paper"] = "fast"
     """The way of training: fast takes seconds on a CPU; paper trains as published, which wants a GPU."""
     time_budget: float | None = None
@@ -115,10 +114,15 @@ class ChartOptions(SourceOptions):
 
     def __post_init__(self) -> None:
         SourceOptions.__post_init__(self)
+        SeamOptions.__post_init__(self)
         fits = self.time_budget is None or (self.time_budget > 0.0 and self.preset == "fast")
         demand(fits, f"time-budget is {self.time_budget}, expected seconds above 0 and preset fast; leave it out")
-        demand(self.charts >= 1, f"charts is {self.charts}, expected 1 or more; pass for instance --charts 8")
         demand_known("preset", self.preset, PRESETS)
+        for name in FAST_ALONE if self.preset == "paper" else ():
+            found = f"{name.replace('_', '-')} with preset paper, which learns its seams, expected preset fast"
+            demand(getattr(self, name) == getattr(SeamOptions, name), f"{found}; leave one of the two out")
+        counted = self.charts != AUTO or self.preset == "fast"
+        demand(counted, "charts auto with preset paper, expected a number; pass for instance --charts 8")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,14 +301,3 @@ class CheckpointOptions:
     resume: Path | None = None
     """The output folder of a run with checkpoints that was cut short.  It goes on with its own mesh and options, so
     nothing else may be given."""
-
-
-def demand_known(name: str, value: str, known: Sequence[str]) -> None:
-    """Raises InputError for a value of an option that is none of those known."""
-    demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
-
-
-def demand(holds: bool, message: str) -> None:
-    """Raises InputError with a message of value, expectation and remedy."""
-    if not holds:
-        raise InputError(message)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ..errors import InputError
+
 if TYPE_CHECKING:
     from cyclopts import Token
 
@@ -33,3 +35,14 @@ Paths = Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)]
 """An option that may be given several times."""
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option without a value, off unless it is given."""
+
+
+def demand_known(name: str, value: str, known: Sequence[str]) -> None:
+    """Raises InputError for a value of an option that is none of those known."""
+    demand(value in known, f"{name} is {value!r}, expected one of {', '.join(known)}; leave --{name} out")
+
+
+def demand(holds: bool, message: str) -> None:
+    """Raises InputError with a message of value, expectation and remedy."""
+    if not holds:
+        raise InputError(message)

@@ -15,7 +15,6 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
-from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
 from ..carry.straighten import straightened
@@ -32,6 +31,7 @@ from .proof import all_proven, is_valid
 from .shorten import shortened
 from .slivers import steadied
 from .starts import Starts, best_search
+from .tighten import back_on, spent_fine, tightened
 
 if TYPE_CHECKING:
     from ...runtime.deadline import Late
@@ -88,10 +88,14 @@ def chart_surface(
 
     def solve(number: int) -> Solved:
         part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
-        starts = Starts(part, charts, part.scale**2 / total, config, seed, scores, late)
+        starts = Starts(part, config.closing.charts, part.scale**2 / total, config, seed, scores, late)
         solved = solve_part(part.surface, charts, starts, config)
         page = float(np.sqrt(total)) / part.scale
-        return solved._replace(pieces=shortened(part.surface, solved.pieces, page, charts, config))
+        return (
+            solved
+            if config.stretch
+            else solved._replace(pieces=shortened(part.surface, solved.pieces, page, charts, config))
+        )
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
@@ -144,7 +148,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
     if not starts.late():
-        found = straightened(found, config.bands)
+        found = straightened(tightened(found, charts, config, starts.late), config.bands)
     pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late)
     if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
         return exact
@@ -164,11 +168,12 @@ def brought_back(
     if late() and coarse is not surface:
         return refined(surface, coarse, list(found.pieces.values()), config)
     if coarse is not middle:
-        found = carried_back(middle, coarse, found, charts, config)
+        found = back_on(middle, coarse, found, charts, config)
     if not late():
         found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)
         found.polish()
+        found = spent_fine(found, charts, config, late) if config.stretch else found
     found.mend()
     pieces = list(found.pieces.values())
     return pieces if middle is surface else refined(surface, middle, pieces, config)

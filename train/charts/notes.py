@@ -35,9 +35,16 @@ def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple
             f"fewer would stretch them by more than {1.0 + config.most_excess:g} on the mean"
         )
     stretched = [sum(piece.energy for piece in part.pieces) for part in solved.values()]
-    if max(stretched) > config.most_excess:
+    asked = config.stretch or config.most_excess
+    missed = sum(excess > asked for excess in stretched)
+    if config.stretch and missed:
         found.append(
-            f"{sum(excess > config.most_excess for excess in stretched)} of {len(solved)} different parts keep a mean "
+            f"{missed} of {len(solved)} different parts keep a mean stretch of up to {1.0 + max(stretched):.4g}, above "
+            f"the {1.0 + config.stretch:g} asked for: it is the closest that was found; allow more --charts"
+        )
+    elif missed:
+        found.append(
+            f"{missed} of {len(solved)} different parts keep a mean "
             f"stretch of up to {1.0 + max(stretched):.3g}; a smaller --charts does not help, a cleaner mesh may"
         )
     resort = sum(piece.resort != "" for part in solved.values() for piece in part.pieces)

@@ -27,6 +27,7 @@ def objective(surface: Surface, pieces: list[Piece], price: float) -> float:
 
 
 def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
-    """What is better comes first: stretch within bounds, no more charts than asked for, a low objective."""
+    """What is better comes first: stretch within bounds, few enough charts, a low objective or short seams."""
     energy = sum(piece.energy for piece in pieces)
-    return energy > config.most_excess, len(pieces) > charts, objective(surface, pieces, config.slit.price)
+    cost = objective(surface, pieces, config.slit.price) - (energy if config.stretch else 0.0)
+    return energy > (config.stretch or config.most_excess), len(pieces) > charts, cost

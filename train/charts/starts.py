@@ -104,8 +104,10 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
     ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
     rounds = config.few_rounds if starts.small else config.rounds
-    ahead = parallel_map(lambda search: search.finish(charts, rounds, starts.late), ahead)
-    return min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, charts, config))
+    few = config.closing.charts
+    ahead = parallel_map(lambda search: search.finish(few, rounds, starts.late), ahead)
+    best = min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, few, config))
+    return best if charts <= few else best.finish(charts, rounds, starts.late)
 
 
 def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:

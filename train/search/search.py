@@ -6,6 +6,7 @@ neck.  Merges are ranked by the energy that curvature foretells, and only the be
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -256,10 +257,9 @@ class Search(State):
         found = parallel_map(lambda key: polished(self.pieces[key], self.area, self.config.slit.contact), keys)
         self.pieces.update(zip(keys, found, strict=True))
 
-    def slit_all(self, above: float, *, contacts: bool = False) -> None:
-        """Slits where they pay, in all pieces of more excess energy than ``above``."""
+    def slit_all(self, above: float, *, contacts: bool = False, price: float | None = None) -> None:
+        """Slits where they pay, at this price or that of the search, in pieces of more excess energy than ``above``."""
+        config = self.config.slit if price is None else replace(self.config.slit, price=price)
         keys = [key for key, piece in self.pieces.items() if piece.energy > above]
-        found = parallel_map(
-            lambda key: slit_further(self.pieces[key], self.area, self.config.slit, contacts=contacts), keys
-        )
+        found = parallel_map(lambda key: slit_further(self.pieces[key], self.area, config, contacts=contacts), keys)
         self.pieces.update(zip(keys, found, strict=True))

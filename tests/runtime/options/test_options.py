@@ -153,3 +153,26 @@ def test_a_background_is_six_hexadecimal_digits(color: str) -> None:
     with pytest.raises(InputError, match=r"background is .*, expected a colour as #rrggbb; pass --background"):
         Outputs(background=color)
     assert Outputs(background="#12aBcd").background == "#12aBcd"
+
+
+def test_seams_have_a_price_a_bound_and_charts_may_be_as_many_as_pay() -> None:
+    asked = from_keywords(Options, None, {"charts": "auto", "seam_price": 0.01, "max_stretch": 1.025})
+    assert (asked.charts, asked.seam_price, asked.max_stretch) == ("auto", 0.01, 1.025)
+    assert asked.most_charts > 1000
+    assert Options(charts=3).most_charts == 3
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"charts": 0}, "charts is 0"),
+        ({"charts": "some"}, "charts is 'some'"),
+        ({"seam_price": 0.0}, "seam-price is 0.0"),
+        ({"max_stretch": 1.0}, "max-stretch is 1.0"),
+        ({"max_stretch": 1.1, "preset": "paper"}, "max-stretch with preset paper"),
+        ({"charts": "auto", "preset": "paper"}, "charts auto with preset paper"),
+    ],
+)
+def test_what_seams_and_charts_can_not_be_is_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Options(**wrong)

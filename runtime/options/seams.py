@@ -1,0 +1,44 @@
+"""What a user may ask of seams and of the number of charts: see unwrap.py, whose rules hold here too.
+
+Annotations are evaluated here, as there.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .words import demand
+
+AUTO = "auto"
+MANY = 10_000
+"""The most charts of a connected part where as many as pay are asked for."""
+DEAREST, LEAST_STRETCH, MOST_STRETCH = 10.0, 1.0001, 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamOptions:
+    """How many charts, and what their seams may cost."""
+
+    charts: int | Literal["auto"] = 8
+    """The most charts that each connected part of the surface may get; auto for as many as pay."""
+    seam_price: float = 0.003
+    """Mean stretch above 1 that a seam as long as √area has to save: higher for fewer and shorter seams and more
+    stretch, lower for the reverse."""
+    max_stretch: float | None = None
+    """Mean stretch (symmetric Dirichlet, 1 is none) that each connected part may have, for the shortest seams that
+    keep it, for instance 1.025; by default the seam price decides alone."""
+
+    def __post_init__(self) -> None:
+        number = isinstance(self.charts, int) and not isinstance(self.charts, bool)
+        fits = self.charts == AUTO or (number and self.most_charts >= 1)
+        demand(fits, f"charts is {self.charts!r}, expected 1 or more, or auto; pass for instance --charts 8")
+        priced = 0.0 < self.seam_price <= DEAREST
+        found = f"seam-price is {self.seam_price}, expected above 0, up to {DEAREST:g}"
+        demand(priced, f"{found}; pass for instance --seam-price 0.003")
+        bounded = self.max_stretch is None or LEAST_STRETCH <= self.max_stretch <= MOST_STRETCH
+        found = f"max-stretch is {self.max_stretch}, expected {LEAST_STRETCH:g} to {MOST_STRETCH:g}"
+        demand(bounded, f"{found}; pass for instance --max-stretch 1.025")
+
+    @property
+    def most_charts(self) -> int:
+        """The most charts of a connected part, as a number."""
+        return self.charts if isinstance(self.charts, int) else MANY

@@ -1,0 +1,69 @@
+"""Fewer charts and shorter seams than the search left: closed, straightened, and closed again.   A part has area 1."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...runtime.deadline import Late, never
+from ..carry.carry import carried_back
+from ..carry.network import network_carried
+from ..seams.closing import Bounds, Closing
+from .objective import rank
+
+if TYPE_CHECKING:
+    from ...runtime.mesh import Surface
+    from ..config import FinishConfig
+    from ..search.search import Search
+
+
+def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
+    """The search with seams closed where that pays, and as far as the bounds on charts and stretch ask for it."""
+    closing, price = config.closing, config.slit.price
+    bounds = Bounds(charts, config.stretch or config.most_excess)
+    if config.stretch:
+        opened_up(search, bounds.excess, config, late)
+    asked = config.stretch or len(search.pieces) > charts
+    Closing(search, bounds, closing, late).close(price, closing.tries_asked if asked else closing.tries)
+    if not late():
+        search = with_straight_seams(search)
+    return spent(search, bounds, config, closing.tries_dearer, late) if config.stretch else search
+
+
+def spent(search: Search, bounds: Bounds, config: FinishConfig, tries: int, late: Late = never) -> Search:
+    """The search with seams closed at higher and higher prices, up to the bound on stretch."""
+    work = Closing(search, bounds, config.closing, late)
+    for price in config.closing.prices:
+        if price > config.slit.price and search.energy() < bounds.excess:
+            work.close(price, tries)
+    return search
+
+
+def spent_fine(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
+    """As `spent`, on the surface itself, in few tries; slits come first where the stretch is too much."""
+    opened_up(search, config.stretch, config, late)
+    return spent(search, Bounds(charts, config.stretch), config, config.closing.tries_fine, late)
+
+
+def with_straight_seams(search: Search) -> Search:
+    """The search with each seam on the cheapest way between its ends, where that lowers the objective."""
+    found = network_carried(search.surface, search)
+    return found if found is not None and found.objective() < search.objective() else search
+
+
+def back_on(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:
+    """The search of a proxy on the surface: its seams as a network, or its labels where that comes out better."""
+    network = network_carried(surface, found)
+    most = max(charts, len(found.pieces))
+    if network is not None and len(network.pieces) <= most and network.objective() <= found.objective():
+        return network
+    labels = carried_back(surface, coarse, found, charts, config)
+    ways = [labels] if network is None else [network, labels]
+    return min(ways, key=lambda search: rank(list(search.pieces.values()), surface, most, config))
+
+
+def opened_up(search: Search, excess: float, config: FinishConfig, late: Late = never) -> None:
+    """Slits at lower and lower prices until the stretch is within bounds, or the lowest is reached; in place."""
+    price = config.slit.price
+    while search.energy() > excess and price > config.closing.cheapest * config.slit.price and not late():
+        search.slit_all(config.slit_above * excess, price=price)
+        price *= config.closing.cheaper
