@@ -12,7 +12,13 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-SOURCES = ("runtime/options/unwrap.py", "runtime/options/pack.py", "runtime/console.py", "bake/commands.py")
+SOURCES = (
+    "runtime/options/unwrap.py",
+    "runtime/options/seams.py",
+    "runtime/options/pack.py",
+    "runtime/console.py",
+    "bake/commands.py",
+)
 PLACE = re.compile(r"^<!-- options: (\w+) -->$", re.MULTILINE)
 
 
