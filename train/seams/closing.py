@@ -16,9 +16,10 @@ from ...runtime.geometry.cutgraph import cut_chains
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
 from ..finish.contact import Relaxed, boundary_edges, excess_energy, rim_overlaps, separate
-from ..finish.curvature import foretold_energies
+from ..finish.curvature import border_first, foretold_energies
 from ..finish.disks import cut_open
-from ..finish.flaps import Trimmed
+from ..finish.flaps import Trimmed, flap_faces
+from ..finish.flatten import sorted_loops
 from ..finish.pieces import Overlapping, Piece, flattened, measured
 from ..finish.slits import Flat, Slit
 from ..workers import parallel_map
@@ -89,8 +90,9 @@ class Closing:
                 continue
             many = len(self.search.pieces) > self.bounds.charts
             bridges = sorted((run for run in runs if len(run.sides) == 2), key=lambda run: run.saved)
-            if not many or not self.take_best(bridges, seam, np.inf):
+            if not many or not bridges:
                 return
+            self.take_best(bridges, seam, np.inf)
 
     def take_best(self, runs: list[Run], seam: NDArray[np.bool_], price: float) -> bool:
         """Close the best of the first runs that pays at this price; False where none does."""
@@ -100,7 +102,7 @@ class Closing:
             block = worth[at : at + self.config.looks]
             self.flatten(block, seam)
             for run in sorted(block, key=lambda run: self.loss(run, price)):
-                if self.loss(run, price) < 0.0 and self.take(run):
+                if self.loss(run, price) < 0.0 and self.take(run, price):
                     return True
                 self.vain.add(run.place)
         return False
@@ -120,14 +122,15 @@ class Closing:
         saved = run.saved - part.rim
         return part.piece.energy - before - price * saved if np.isfinite(price) else -saved
 
-    def take(self, run: Run) -> bool:
+    def take(self, run: Run, price: float) -> bool:
         """Replace the pieces beside a run; False, and nothing done, where the bounds are broken."""
         search, part = self.search, self.tried[run.name]
         if part is None:
             return False
         before = dict(search.pieces)
         most = max(len(before), self.bounds.charts)
-        if search.exchange(run.sides, [part], -np.inf, most) and search.energy() <= self.bounds.excess:
+        least = 0.0 if price == search.price else -np.inf
+        if search.exchange(run.sides, [part], least, most) and search.energy() <= self.bounds.excess:
             return True
         search.pieces = before
         self.tried[run.name] = None
@@ -149,20 +152,23 @@ class Closing:
 
     def foretell(self, run: Run, seam: NDArray[np.bool_]) -> float:
         """Energy that closing a run is foretold to cost."""
-        search, rules = self.search, self.search.rules
-        ids = np.concatenate([search.pieces[key].ids for key in run.sides])
-        faces = search.surface.faces[ids]
+        before = (run.sides, (-1, -1, 0))
+        if before not in self.foretold:
+            self.foretold[before] = self.needed(run.sides, seam)
         still = seam.copy()
         still[run.edges] = False
-        still |= ~search.table.manifold
-        energies = []
-        for cut in (seam | ~search.table.manifold, still):
-            rim = np.ones(len(search.surface.vertices), dtype=bool)
-            rim[faces] = False
-            rim[search.table.edges[cut]] = True
-            u = rules.curvature.factor(rim)
-            energies.append(float(foretold_energies(faces, search.areas[ids], u).sum()) / search.area)
-        return (energies[1] - energies[0]) * search.config.foretold
+        return self.needed(run.sides, still) - self.foretold[before]
+
+    def needed(self, sides: tuple[int, ...], seam: NDArray[np.bool_]) -> float:
+        """Energy foretold of pieces that are cut along a mask (e,), and joined elsewhere."""
+        search = self.search
+        ids = np.concatenate([search.pieces[key].ids for key in sides])
+        faces = search.surface.faces[ids]
+        rim = np.ones(len(search.surface.vertices), dtype=bool)
+        rim[faces] = False
+        rim[search.table.edges[seam | ~search.table.manifold]] = True
+        u = search.rules.curvature.factor(rim)
+        return float(foretold_energies(faces, search.areas[ids], u).sum()) / search.area * search.config.foretold
 
     def closed(self, run: Run, seam: NDArray[np.bool_]) -> Trimmed | None:
         """The pieces beside a run as one, with the run closed; None where that is not valid or not within bounds."""
@@ -200,6 +206,11 @@ def laid_open(
     loops = len(boundary_loops(opened))
     if loops == 0 or 2 - loops != euler_characteristic(opened):
         return None
+    if start is None and loops == 1:
+        first = border_first(disk, sorted_loops(disk)[0], search.config.slit.contact.cotangents)
+        if lies_over_itself(disk, first, search.config.closing.hopeless):
+            return None
+        start = lambda _: first  # noqa: E731
     uv = flattened(disk, search.config.slit.contact, goal * search.area, start)
     if uv is None or excess_energy(disk, uv) > goal * search.area:
         return None
@@ -207,6 +218,14 @@ def laid_open(
     if rim_overlaps(opened, boundary_edges(opened), uv):
         return Overlapping(ids, Flat(disk, uv, {}), slits)
     return measured(surface, ids, Flat(disk, uv, {}), search.area, slits)
+
+
+def lies_over_itself(disk: Surface, uv: NDArray[np.float64], most: float) -> bool:
+    """True where more than a share ``most`` of a layout lies over the rest: relaxed, it will overlap too."""
+    if not rim_overlaps(disk.faces, boundary_edges(disk.faces), uv):
+        return False
+    areas = disk.face_areas()
+    return float(areas[flap_faces(uv[disk.faces], areas)].sum()) > most * float(areas.sum())
 
 
 def valid(search: Search, found: Piece | Overlapping | None, rounds: int) -> Trimmed | None:

@@ -15,7 +15,7 @@ class ClosingConfig:
     """Lengths of the runs tried, as shares of the chain that they are part of."""
     least: int = 1
     """Edges of a run."""
-    tries: int = 16
+    tries: int = 32
     """Runs flattened where the price of seams alone asks for it …"""
     tries_asked: int = 60
     """… where there are more charts than asked for …"""
@@ -23,9 +23,11 @@ class ClosingConfig:
     """… at each higher price, where stretch was asked for …"""
     tries_fine: int = 8
     """… and the same on the surface itself."""
-    rounds: int = 3
+    hopeless: float = 0.03
+    """Share of a first layout that may lie over the rest; beyond it, it is not relaxed."""
+    rounds: int = 2
     """Rounds in which a little overlap may be drawn apart."""
-    patience: int = 8
+    patience: int = 12
     """Runs flattened in vain before the rest, foretold worse, are believed not to pay."""
     looks: int = 4
     """Runs flattened at a time."""
