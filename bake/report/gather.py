@@ -6,7 +6,7 @@ A folder may come from anyone: what its report says is looked at piece by piece,
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,6 +52,7 @@ def results_in(paths: Sequence[Path], settings: ReportSettings | None = None) ->
     settings = settings or ReportSettings()
     several = len(paths) > 1
     found: list[Result] = []
+    places: list[Path] = []
     for path in paths:
         stems = _stems(path) if path.is_dir() else [path.stem]
         if len(found) + len(stems) > settings.most:
@@ -59,8 +60,24 @@ def results_in(paths: Sequence[Path], settings: ReportSettings | None = None) ->
             raise InputError(f"{count}; name a report file of the folder: {path}/STEM{REPORT}")
         for stem in stems:
             found += _results(path, stem, settings, several=several or len(stems) > 1)
+            places.append(
+                path.resolve() / stem if path.is_dir() else path.resolve().with_name(path.name.removesuffix(REPORT))
+            )
             _demand_room(found, settings)
-    return found
+    if len(places) == 1:
+        return found
+    return [replace(result, title=title) for result, title in zip(found, told_apart(places), strict=True)]
+
+
+def told_apart(places: Sequence[Path]) -> list[str]:
+    """The end of each path, as short as tells it from the others; a folder with the name of its result is said once."""
+    ways = [(place.parent if place.name == place.parent.name else place).parts for place in places]
+
+    def title(way: tuple[str, ...]) -> str:
+        alone = (n for n in range(1, len(way)) if sum(other[-n:] == way[-n:] for other in ways) == 1)
+        return "/".join(way[-next(alone, len(way) - 1) :])
+
+    return [title(way) for way in ways]
 
 
 def write_result(output: OutputFolder, atlas: Atlas, asset: Asset, report: Mapping[str, Any]) -> None:
@@ -114,8 +131,7 @@ def _results(path: Path, stem: str, settings: ReportSettings, *, several: bool) 
         return [measured(path.name, Shape.of_asset(asset, asset.uv), asset.sha256)]
     report = read_report(path / f"{stem}{REPORT}")
     asset = load_asset(_mesh_beside(path, stem))
-    title = f"{path.resolve().name}/{stem}" if several else stem
-    after = reported(title, Shape.of_asset(asset, _written_uv(asset, report)), report, path, settings.picture)
+    after = reported(stem, Shape.of_asset(asset, _written_uv(asset, report)), report, path, settings.picture)
     return [after] if several else [*before_of(asset, _old_uv(asset, report), after), after]
 
 

@@ -1,6 +1,6 @@
 // The page: controls, panes and pointing, wired together.  Drawn when something has changed, not all the time.
 import * as THREE from "three";
-import { pointOf, readData } from "data";
+import { FLIPPED, OVERLAPPING, pointOf, readData } from "data";
 import { Stage } from "stage";
 import { Orbit, Pane, Sheet } from "panes";
 import { described, normalOf, spotAt } from "pointing";
@@ -19,6 +19,7 @@ class Page {
     this.panes = [];
     this.makeLooks();
     this.makeResults();
+    this.countMarks();
     this.listen();
     this.readControls();
   }
@@ -56,6 +57,14 @@ class Page {
       this.panes.push(model, layout);
     });
     by("shown").hidden = results.length < 2;
+  }
+
+  /** How many triangles of each result a mark is on. */
+  countMarks() {
+    for (const [name, bit] of [["flipped", FLIPPED], ["overlapping", OVERLAPPING]]) {
+      const counts = this.data.results.map(({ flags }) => flags.reduce((sum, flag) => sum + Number((flag & bit) > 0), 0));
+      by(`${name}-count`).textContent = counts.some(Boolean) ? counts.join(" · ") : "none";
+    }
   }
 
   listen() {

@@ -72,12 +72,14 @@ float lit() {
   return 0.5 + 0.55 * max(0.0, dot(normal, normalize(vec3(0.3, 0.5, 0.8)))) + 0.15 * max(0.0, -normal.x);
 }
 
+// Flipped faces are blue, overlapping ones striped in orange; what is neither fades.
 vec3 marked(vec3 base, int flags) {
-  bool hit = (flags & marks) != 0;
-  if (marks != 0) base = mix(vec3(dot(base, vec3(0.3, 0.6, 0.1))), base, 0.35);
-  if (hit && (flags & marks & 2) != 0) base = mix(OVERLAPPING, vec3(0.3, 0.05, 0.0), step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 10.0)));
-  if (hit && (flags & marks & 1) != 0) base = FLIPPED;
-  return base;
+  if (marks == 0) return base;
+  bool flipped = (flags & marks & 1) != 0, overlapping = (flags & marks & 2) != 0;
+  base = flipped ? FLIPPED : mix(vec3(dot(base, vec3(0.3, 0.6, 0.1))), base, 0.35);
+  if (!overlapping) return base;
+  float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 10.0));
+  return mix(OVERLAPPING, flipped ? FLIPPED : vec3(0.3, 0.05, 0.0), stripe);
 }
 
 void main() {

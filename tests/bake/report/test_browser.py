@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -159,6 +160,58 @@ def choose(page: Any, look: str) -> None:
     page.run("flexparaReport.spot = null")
     page.run(f"[...document.querySelectorAll('[name=look]')].find((input) => input.value === {look!r}).click()")
     page.wait(f"document.documentElement.dataset.drawn !== {drawn!r}")
+
+
+@pytest.fixture(scope="module")
+def folded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A browser at the report of one result: its third triangle is turned over and lies on the second."""
+    folder = tmp_path_factory.mktemp("folded")
+    made.write_result(folder / "a", obj=made.OBJ.replace("vt 0.6 0.7", "vt 0.85 0.2"))
+    path = folder / "report.html"
+    path.write_text(html_of(results_in([folder / "a"]), "folded"), encoding="utf-8")
+    assert PROGRAM is not None
+    with browser.started(PROGRAM, folder / "profile") as found:
+        found.open(path.as_uri())
+        found.wait(DRAWN)
+        choose(found, "plain")
+        yield found
+
+
+def mark(page: Any, **values: Any) -> None:
+    """Set checkboxes and sliders, and wait until that is drawn."""
+    drawn = page.run("document.documentElement.dataset.drawn")
+    for name, value in values.items():
+        field = "checked" if isinstance(value, bool) else "value"
+        page.run(f"document.getElementById('controls').elements.{name}.{field} = {json.dumps(value)}")
+    page.run("document.getElementById('controls').dispatchEvent(new Event('input'))")
+    page.wait(f"document.documentElement.dataset.drawn !== {drawn!r}")
+
+
+def seen(page: Any, u: float, v: float, apart: float = 0.0) -> list[int]:
+    """The colour of a place of the layout, a few pixels to the right of it if so wished."""
+    x, y = (u - 0.5) / 1.08 + 0.5 + apart, 0.5 - (v - 0.5) / 1.08
+    return page.run(f"({PIXEL})(1, {x}, {y})")[:3]
+
+
+def test_flips_and_overlap_are_marked_where_they_are_and_counted(folded: Any) -> None:
+    turned, whole = (0.783, 0.333), (0.25, 0.3)
+    mark(folded, seams=False, flipped=True)
+    assert seen(folded, *turned) == pytest.approx([0, 184, 242], abs=3)
+    assert seen(folded, *whole) == pytest.approx([204] * 3, abs=12)
+    mark(folded, overlapping=True)
+    both = {tuple(seen(folded, *turned, apart=step * 0.004)) for step in range(8)}
+    assert len(both) >= 2  # stripes: neither mark hides the other
+    texts = [folded.run(f"document.getElementById('{name}-count').textContent") for name in ("flipped", "overlapping")]
+    assert texts == ["1", "2"]
+    mark(folded, flipped=False, overlapping=False)
+
+
+def test_a_mip_level_is_what_a_texture_has_left_there(folded: Any) -> None:
+    choose(folded, made.EVIL)
+    assert seen(folded, 0.25, 0.3) == pytest.approx([200, 30, 30], abs=6)
+    mark(folded, level=6)  # of 64 texels: one is left, half red and half black
+    assert seen(folded, 0.25, 0.3)[0] < 160
+    assert folded.run("document.getElementById('level-value').textContent").startswith("6, charts mix")
 
 
 def test_light_and_dark(page: Any) -> None:

@@ -18,7 +18,7 @@ from PIL import Image
 
 from flexpara.__main__ import main
 from flexpara.bake.heat import signed_distortion
-from flexpara.bake.report.gather import ReportSettings, read_report, results_in
+from flexpara.bake.report.gather import ReportSettings, read_report, results_in, told_apart
 from flexpara.bake.report.page import html_of, packed
 from flexpara.bake.report.pictures import picture_file
 from flexpara.bake.report.shape import FLIPPED, OVERLAPPING, Shape, face_facts
@@ -116,8 +116,14 @@ def test_what_is_no_result_is_refused_with_a_remedy(folder: Path, tmp_path: Path
 
 def test_a_mesh_of_any_tool_stands_beside_a_result(folder: Path) -> None:
     first, second = results_in([folder, folder / "card.obj"])
-    assert (first.title, second.title) == ("out/card", "card.obj")
+    assert (first.title, second.title) == ("card", "card.obj")
     assert second.metrics["charts"] == 2
+
+
+def test_titles_are_the_ends_of_paths_that_tell_results_apart() -> None:
+    places = [Path(place) for place in ("/x/cow/cow", "/x/planar.obj", "/a/bunny", "/b/bunny", "/b/bunny/bunny.glb")]
+    assert told_apart(places) == ["cow", "planar.obj", "a/bunny", "b/bunny", "bunny.glb"]
+    assert told_apart([Path("/x/a"), Path("/x/a")]) == ["x/a", "x/a"]
 
 
 def test_the_page_names_no_address_but_data(folder: Path) -> None:
