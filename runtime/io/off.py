@@ -160,7 +160,8 @@ def _uniform_polygons(words: _Words, place: int, count: int) -> NDArray[np.int64
     if count * width != end - place or set(text[place::width]) != {text[place]}:
         return None
     table = words.numbers(place, end).reshape(count, width)[:, 1:]
-    return table.astype(np.int64) if (table == np.rint(table)).all() else None
+    whole = (table == np.rint(table)) & (np.abs(table) < 2**40)  # beyond, no vertex has such a number
+    return table.astype(np.int64) if whole.all() else None
 
 
 def _polygon(words: _Words, place: int, index: int) -> list[int]:

@@ -6,6 +6,8 @@ h w texels.  A mesh file may come from anyone: names in it reach no file outside
 from __future__ import annotations
 
 import io
+import struct
+import zlib
 from pathlib import PureWindowsPath
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_PIXELS = 16384 * 16384
+FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+"""Kinds of pictures that are opened.  Pillow knows others, some of which start programs or are hardly used."""
+BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
+BROKEN += (zlib.error, Image.DecompressionBombError, MemoryError)
+"""What Pillow raises on damaged files: it has no family of its own."""
 
 
 def read_in_folder(folder: Path, name: str) -> bytes | None:
@@ -53,9 +60,11 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
     Raises: MeshError for bytes that are no picture, or more than MAX_PIXELS pixels.
     """
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             return picture_pixels(image)
-    except (Image.UnidentifiedImageError, Image.DecompressionBombError) as error:
+    except MeshError:
+        raise
+    except BROKEN as error:
         raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
 
 
@@ -70,7 +79,7 @@ def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
         )
     try:
         return np.asarray(image.convert("RGBA"), dtype=np.uint8)
-    except (OSError, ValueError, SyntaxError) as error:
+    except BROKEN as error:
         raise MeshError("a texture is damaged, expected a whole PNG or JPEG; remove it or save it as PNG") from error
 
 

@@ -6,7 +6,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import BundleError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -42,6 +42,11 @@ def fill_in_chunks(
     def fill(start: int) -> None:
         rows = slice(start, start + chunk)
         for target, found in zip(answer, run(rows), strict=True):
+            if found.shape != target[rows].shape:
+                raise BundleError(
+                    f"the model answers an array of shape {found.shape}, expected {target[rows].shape}; the file is "
+                    "damaged: pass the .onnx file that flexpara unwrap wrote"
+                )
             target[rows] = found
 
     starts = range(0, len(answer[0]), chunk)

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .controls import CONTROLS
 from .readers import READERS
 from .worker import Case, Limits, serve
 
@@ -117,10 +118,11 @@ def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of all that is random")
     parser.add_argument("--first", type=int, default=0, help="number of the first case of each reader")
     parser.add_argument("--reader", action="append", choices=sorted(READERS), help="of these alone; may be repeated")
+    parser.add_argument("--control", action="append", choices=sorted(CONTROLS), help="a reader that does wrong")
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"), help="the folder for findings")
     parser.add_argument("--seeds", type=Path, help="a file that keeps seeds from one run to the next")
     asked = parser.parse_args(words)
-    asked.reader, asked.keep = asked.reader or list(READERS), asked.keep.absolute()
+    asked.reader, asked.keep = asked.control or asked.reader or list(READERS), asked.keep.absolute()
     return asked
 
 
@@ -130,7 +132,7 @@ def seeds_of(path: Path | None) -> dict[str, list[bytes]]:
         return pickle.loads(path.read_bytes())
     from .seedfiles import all_seeds
 
-    seeds = all_seeds()
+    seeds = all_seeds() | {name: [b"a"] for name in CONTROLS}
     if path is not None:
         path.write_bytes(pickle.dumps(seeds))
     return seeds

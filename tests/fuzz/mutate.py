@@ -166,7 +166,9 @@ def by_zip(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
     mutate = by_words if found[name].lstrip()[:1] == b"<" and rng.random() < 0.7 else by_bytes
     found[name] = mutate(rng, [found[name]])
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", pick(rng, (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA))) as archive:
+    with zipfile.ZipFile(
+        stream, "w", pick(rng, (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA))
+    ) as archive:
         for member, content in found.items():
             archive.writestr(member, content)
     return stream.getvalue()
@@ -185,7 +187,9 @@ def by_png(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
     parts[chosen] = (parts[chosen][0], by_bytes(rng, [parts[chosen][1]]))
     if rng.random() < 0.2:
         parts.insert(chosen, pick(rng, parts))
-    packed = (struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in parts)
+    packed = (
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in parts
+    )
     return data[:8] + b"".join(packed)
 
 

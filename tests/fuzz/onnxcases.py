@@ -12,8 +12,32 @@ from onnx import TensorProto, helper, numpy_helper
 
 from .mutate import NUMBERS, by_bytes, json_text, pick
 
-OPERATORS = ("Add", "Gather", "Loop", "If", "Scan", "Tile", "Expand", "ConstantOfShape", "Range", "Resize", "Pad", "Where")
-OPERATORS += ("Shape", "NonZero", "TopK", "Cast", "Reshape", "Concat", "MatMul", "Einsum", "StringSplit", "RandomNormal")
+OPERATORS = (
+    "Add",
+    "Gather",
+    "Loop",
+    "If",
+    "Scan",
+    "Tile",
+    "Expand",
+    "ConstantOfShape",
+    "Range",
+    "Resize",
+    "Pad",
+    "Where",
+)
+OPERATORS += (
+    "Shape",
+    "NonZero",
+    "TopK",
+    "Cast",
+    "Reshape",
+    "Concat",
+    "MatMul",
+    "Einsum",
+    "StringSplit",
+    "RandomNormal",
+)
 DOMAINS = ("com.microsoft", "ai.onnx.ml", "evil.domain", "ai.onnx.training", "")
 KEY = "flexpara"
 

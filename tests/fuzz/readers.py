@@ -44,6 +44,7 @@ def read_any(path: Path) -> object:
 def read_scene(path: Path) -> object:
     """As `unwrap` and `bake` read a scene: its meshes once, all instances, all columns of its vertices."""
     from flexpara.runtime.io.gltf.columns import primitive_columns
+    from flexpara.runtime.io.gltf.editing import Editing
     from flexpara.runtime.io.meshfile import load_asset
 
     load_asset(path, instances=True)
@@ -52,7 +53,7 @@ def read_scene(path: Path) -> object:
     for part in asset.document.parts:
         mesh = asset.document.file.tree["meshes"][part.mesh]
         primitive_columns(asset.document.file, mesh["primitives"][part.primitive])
-    return asset
+    return Editing(asset.document.file).finished()
 
 
 def read_points_and_cloud(path: Path) -> object:
@@ -112,7 +113,7 @@ def _with_library(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
 
 
 def _textured(kind: str) -> Callable[[bytes, Mapping[str, list[bytes]]], Files]:
-    def around(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+    def around(data: bytes, _: Mapping[str, list[bytes]]) -> Files:
         holder = {"extensions": {"KHR_texture_basisu": {"source": 0}}} if kind == "ktx2" else {"source": 0}
         points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32).tobytes()
         tree = {
@@ -136,7 +137,7 @@ def _textured(kind: str) -> Callable[[bytes, Mapping[str, list[bytes]]], Files]:
     return around
 
 
-def _draco(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+def _draco(data: bytes, _: Mapping[str, list[bytes]]) -> Files:
     packed = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
     views = [{"buffer": 0, "byteLength": len(data)}]
     return {"a.glb": _packed(data, views, [{}, {}], {"extensions": packed})}
@@ -206,9 +207,12 @@ READERS: dict[str, Reader] = {
     "dae": Reader("a.dae", text_or_bytes, read_any),
     "onnx": Reader("a.onnx", by_onnx, read_onnx),
     "wrap": Reader("a.wrap.onnx", by_onnx, read_wrap),
-    "trained": Reader("box.trained.safetensors", in_turn(mutate.by_safetensors, mutate.by_safetensors, by_bytes), read_trained, _trained),
-    "report": Reader("box.report.json", in_turn(mutate.by_json, by_bytes), read_report, _report),
-    "run": Reader(
-        "mesh.checkpoint/run.json", in_turn(mutate.by_json, by_bytes), read_run,
+    "trained": Reader(
+        "box.trained.safetensors",
+        in_turn(mutate.by_safetensors, mutate.by_safetensors, by_bytes),
+        read_trained,
+        _trained,
     ),
+    "report": Reader("box.report.json", in_turn(mutate.by_json, by_bytes), read_report, _report),
+    "run": Reader("mesh.checkpoint/run.json", in_turn(mutate.by_json, by_bytes), read_run),
 }

@@ -1,4 +1,4 @@
-"""Small whole files of every format that is read: what mutators start from.  Also the found ones, in `seeds/READER/`."""
+"""Small whole files of every format that is read: what mutators start from; and found ones, in `seeds/READER/`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ f 1 2 5
 f -5 -4 -3
 f 3//1 4//1 5//1
 """
-MTL = "newmtl paint\nKd .2 .4 1\nd .5\nPm 1\nPr .3\nKe 1 0 0\nmap_Kd -clamp on skin.png\nnorm skin.png\nnewmtl glass\nd .2\n"
+MTL = "newmtl paint\nKd .2 .4 1\nd .5\nPm 1\nPr .3\nKe 1 0 0\nmap_Kd -clamp on skin.png\nnorm skin.png\n"
+MTL += "newmtl glass\nd .2\n"
 PLAIN = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\n"
 PLY = """ply
 format ascii 1.0
@@ -84,9 +85,11 @@ end_header
 0 1 1
 7 0 1 2 3 -1 0 1
 """
-POINTS = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n"
-POINTS += "property float ny\nproperty float nz\nend_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n1 1 0 0 0 1\n2 1 0 0 0 1\n"
-STL = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"
+POINTS = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+POINTS += "property float nx\nproperty float ny\nproperty float nz\nend_header\n"
+POINTS += "0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n1 1 0 0 0 1\n2 1 0 0 0 1\n"
+STL = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+STL += "endloop\nendfacet\nendsolid a\n"
 OFFS = (
     "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 1\n4 0 1 2 3 255 0 0\n3 0 1 2\n",
     "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 1 0 0 1 1 0\n0 1 0 0 0 1 1 0 0 1 0 1\n3 0 1 2\n",
@@ -180,7 +183,10 @@ def gltf() -> bytes:
     """A glTF file in one piece, with a node of instances, a sparse accessor, a strip and a material."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32).tobytes()
     uv, skin = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32).tobytes(), picture("PNG")
-    places, sparse = np.array([[0, 0, 2], [0, 0, 4]], np.float32).tobytes(), np.array([1], np.uint16).tobytes() + b"\0\0"
+    places, sparse = (
+        np.array([[0, 0, 2], [0, 0, 4]], np.float32).tobytes(),
+        np.array([1], np.uint16).tobytes() + b"\0\0",
+    )
     tree, body = {"asset": {"version": "2.0"}, "scene": 0}, b""
     tree["bufferViews"] = []
     for part in (points, uv, places, sparse, np.array([5, 5, 5], np.float32).tobytes(), skin):
@@ -227,7 +233,10 @@ MADE: dict[str, Callable[[], list[bytes]]] = {
     "jpg": lambda: [picture("JPEG", "RGB"), picture("JPEG", "L"), picture("JPEG", "CMYK")],
     "ktx2": list,
     "npy": lambda: [array_file(np.arange(24.0).reshape(8, 3) % 5), array_file(np.eye(6, dtype=np.float32))],
-    "npz": lambda: [arrays_file(points=np.arange(24.0).reshape(8, 3) % 5, colors=np.ones((8, 3))), arrays_file(a=np.eye(3))],
+    "npz": lambda: [
+        arrays_file(points=np.arange(24.0).reshape(8, 3) % 5, colors=np.ones((8, 3))),
+        arrays_file(a=np.eye(3)),
+    ],
     "csv": lambda: [table.encode() for table in TABLES],
     "3mf": lambda: [exported("3mf")],
     "dae": lambda: [exported("dae")],

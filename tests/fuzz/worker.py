@@ -12,6 +12,7 @@ import shutil
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -20,11 +21,17 @@ from typing import Any
 
 import numpy as np
 
-from .readers import READERS
+from .controls import CONTROLS
+from .readers import READERS, Reader
 
 SEEDS_FIRST = 1
 """Times that each seed is read as it is, before it is damaged."""
 FORBIDDEN = ("/etc/passwd", "/etc/hostname", "/dev/zero", "/dev/random")
+
+
+def reader_of(name: str) -> Reader:
+    """A reader of flexpara, or a control."""
+    return READERS[name] if name in READERS else CONTROLS[name]
 
 
 @dataclass(frozen=True)
@@ -49,12 +56,12 @@ class Case:
         if self.number < SEEDS_FIRST * len(own):
             return own[self.number % len(own)]
         rng = np.random.default_rng([self.seed, self.number, *self.reader.encode()])
-        return READERS[self.reader].mutate(rng, own)
+        return reader_of(self.reader).mutate(rng, own)
 
 
 def lay_out(case: Case, seeds: Mapping[str, list[bytes]], root: Path) -> Path:
     """The case as files in `root/case`, a secret and links to it beside them; returns the file to read."""
-    reader, folder, outside = READERS[case.reader], root / "case", root / "outside"
+    reader, folder, outside = reader_of(case.reader), root / "case", root / "outside"
     shutil.rmtree(root, ignore_errors=True)
     for place in (folder, outside):
         place.mkdir(parents=True)
@@ -73,6 +80,7 @@ def serve(pipe: Connection, root: Path, seeds: Mapping[str, list[bytes]], limits
 
     opened: list[str] = []
     warm_up()
+    warnings.simplefilter("error")  # a user would see them on stderr
     sys.addaudithook(lambda event, found: _watch(event, found, opened, root))
     (root.parent / "here").mkdir(exist_ok=True)
     os.chdir(root.parent / "here")
@@ -83,7 +91,7 @@ def serve(pipe: Connection, root: Path, seeds: Mapping[str, list[bytes]], limits
         resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
         signal.setitimer(signal.ITIMER_PROF, limits.seconds)
         try:
-            READERS[case.reader].read(path)
+            reader_of(case.reader).read(path)
             said = "read"
         except FlexparaError as error:
             said = "refused" if _names(error) else f"a message without its parts: {error}"

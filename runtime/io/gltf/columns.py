@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .buffers import COMPONENTS, GltfFile, buffer_view, stored_accessor
 from .compression import DRACO, decode_draco
+from .damage import damage_is_named
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,8 +24,13 @@ class Column:
 def primitive_columns(file: GltfFile, primitive: dict[str, Any]) -> tuple[dict[str, Column], list[dict[str, Column]]]:
     """The attributes by name, and those of each morph target.
 
-    Raises: MeshError, lookup and value errors where the file is damaged.
+    Raises: MeshError where the file is damaged.
     """
+    with damage_is_named():
+        return _columns(file, primitive)
+
+
+def _columns(file: GltfFile, primitive: dict[str, Any]) -> tuple[dict[str, Column], list[dict[str, Column]]]:
     names = primitive["attributes"]
     packed = primitive.get("extensions", {}).get(DRACO)
     decoded: dict[str, NDArray[Any]] = {}

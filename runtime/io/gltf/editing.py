@@ -15,6 +15,7 @@ import numpy as np
 
 from .buffers import BINARY_CHUNK, COMPONENTS, JSON_CHUNK, GltfFile, buffer_view, read_resource
 from .compression import MESHOPT
+from .damage import damage_is_named
 from .references import extensions_in, prune
 
 if TYPE_CHECKING:
@@ -34,8 +35,12 @@ class Editing:
     """The tree, free to be changed, and the bytes of each of its bufferViews."""
 
     def __init__(self, file: GltfFile) -> None:
-        """A copy of the document; the file stays as it is."""
+        """A copy of the document; the file stays as it is.  Raises: MeshError where it is damaged."""
         self.file = file
+        with damage_is_named():
+            self._copy(file)
+
+    def _copy(self, file: GltfFile) -> None:
         self.tree: dict[str, Any] = copy.deepcopy(file.tree)
         self.had = extensions_in(self.tree)
         self.views = [bytes(buffer_view(file, index)[0]) for index in range(len(self.tree.get("bufferViews", [])))]

@@ -6,22 +6,23 @@ sRGB.  Read here and not with trimesh, which drops uv without a material, ignore
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import FlexparaError, MeshError
+from ...errors import MeshError
 from ..colors import linear_to_srgb
 from ..polygons import strip_triangles
 from ..rawmesh import MAX_FACES, RawMesh, merge, transformed
 from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor, read_buffers
+from .columns import primitive_columns
 from .compression import DRACO, decode_draco
+from .damage import damage_is_named
 from .document import Document, Part
 from .materials import read_materials, uv_set
 from .nodes import best_placements, placed_meshes, select_placements
+from .references import references
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,34 +48,10 @@ def read_gltf(data: bytes, folder: Path, *, instances: bool = False, select: Seq
         MeshError: damaged, of an extension that must be known and is not, without triangles, or with such a reference.
         MissingDependencyError: compressed, and flexpara[formats] is absent.
     """
-    try:
+    with damage_is_named():
         tree, binary = parse_tree(data)
         file = GltfFile(tree, read_buffers(tree, binary, folder), folder)
         return _scene(file, select, instances=instances)
-    except FlexparaError:
-        raise
-    except (
-        KeyError,
-        IndexError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        OverflowError,
-        struct.error,
-        RecursionError,
-    ) as error:
-        raise MeshError(f"the glTF file is damaged ({_what(error)}), expected glTF 2.0; export it again") from error
-
-
-def _what(error: Exception) -> str:
-    """What reading stumbled over, in words of the format."""
-    if isinstance(error, KeyError):
-        return f"{str(error.args[0])[:40]!r} is missing or not allowed"
-    if isinstance(error, IndexError):
-        return "a number refers to what is not there"
-    if isinstance(error, json.JSONDecodeError):
-        return f"line {error.lineno} of its JSON is not readable"
-    return "a value has the wrong type or size"
 
 
 def _scene(file: GltfFile, select: Sequence[str], *, instances: bool) -> RawMesh:
@@ -100,7 +77,17 @@ def _scene(file: GltfFile, select: Sequence[str], *, instances: bool) -> RawMesh
     whole = merge(found)  # what it counts is nothing that the document loses
     if instances:
         return replace(whole, changes={**whole.changes, **changes, "skipped_primitives": skipped})
+    _check_kept(file, parts)
     return replace(whole, document=Document(file, tuple(parts), tuple(placements)), changes=changes)
+
+
+def _check_kept(file: GltfFile, parts: Sequence[Part]) -> None:
+    """Refuse now what writing the document again would stumble over: data that nothing has read so far."""
+    for array, holder, key in references(file.tree):
+        if not 0 <= holder[key] < len(file.tree[array]):
+            raise MeshError(f"a glTF {key} is {str(holder[key])[:20]}, expected a number below those of {array}")
+    for part in parts:
+        primitive_columns(file, file.tree["meshes"][part.mesh]["primitives"][part.primitive])
 
 
 def _numbered(raw: RawMesh, part: int, mesh: int) -> RawMesh:
