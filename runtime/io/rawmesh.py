@@ -109,8 +109,8 @@ def transformed(part: RawMesh, world: NDArray[np.float64]) -> RawMesh:
     normals = None
     if part.normals is not None:
         cofactor = np.stack([np.cross(linear[(i + 1) % 3], linear[(i + 2) % 3]) for i in range(3)])
-        turned = part.normals @ (-cofactor if mirrored else cofactor).T
-        normals = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        with np.errstate(invalid="ignore", over="ignore"):  # of a scale beyond reason; they become zero
+            normals = unit_vectors(part.normals @ (-cofactor if mirrored else cofactor).T)
     with np.errstate(invalid="ignore", over="ignore"):  # positions that are not finite are refused when they are used
         positions = part.positions @ linear.T + world[:3, 3]
     return replace(

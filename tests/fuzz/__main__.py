@@ -31,7 +31,7 @@ class Tally:
     """What came of the cases.  counts: (reader, outcome) → number.  slowest: seconds of each reader's slowest case."""
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    seconds: Counter[str] = field(default_factory=Counter)
+    seconds: dict[str, float] = field(default_factory=dict)
     slowest: dict[str, float] = field(default_factory=dict)
 
 
@@ -79,7 +79,7 @@ def fuzz(asked: argparse.Namespace, seeds: Mapping[str, list[bytes]], place: Pat
             case, start = Case(name, number, asked.seed), time.monotonic()
             said = worker.outcome(case)
             took = time.monotonic() - start
-            tally.seconds[name] += took
+            tally.seconds[name] = tally.seconds.get(name, 0.0) + took
             tally.slowest[name] = max(took, tally.slowest.get(name, 0.0))
             outcome = said if said in ("read", "refused") else "finding"
             tally.counts[name, outcome] += 1

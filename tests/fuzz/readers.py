@@ -139,7 +139,7 @@ def _textured(kind: str) -> Callable[[bytes, Mapping[str, list[bytes]]], Files]:
 
 def _draco(data: bytes, _: Mapping[str, list[bytes]]) -> Files:
     packed = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
-    views = [{"buffer": 0, "byteLength": len(data)}]
+    views: list[dict[str, object]] = [{"buffer": 0, "byteLength": len(data)}]
     return {"a.glb": _packed(data, views, [{}, {}], {"extensions": packed})}
 
 

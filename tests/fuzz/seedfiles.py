@@ -14,6 +14,7 @@ import meshoptimizer
 import numpy as np
 import trimesh
 from PIL import Image
+from trimesh.exchange.gltf import export_gltf
 
 import flexpara
 from flexpara.__main__ import main
@@ -103,9 +104,9 @@ def box() -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
-def exported(kind: str, **more: object) -> bytes:
+def exported(kind: str) -> bytes:
     """A box as trimesh writes it."""
-    found = box().export(file_type=kind, **more)
+    found = box().export(file_type=kind)
     return found.encode() if isinstance(found, str) else bytes(found)
 
 
@@ -133,7 +134,7 @@ def array_file(array: np.ndarray) -> bytes:
 def arrays_file(**arrays: np.ndarray) -> bytes:
     """A .npz file."""
     stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)
+    np.savez_compressed(stream, allow_pickle=False, **arrays)
     return stream.getvalue()
 
 
@@ -215,7 +216,7 @@ def gltf() -> bytes:
 
 def gltf_text() -> bytes:
     """A .gltf file whose buffer is a data URI."""
-    files = trimesh.exchange.gltf.export_gltf(trimesh.Scene(box()), embed_buffers=True)
+    files = export_gltf(trimesh.Scene(box()), embed_buffers=True)
     return files["model.gltf"]
 
 
