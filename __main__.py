@@ -30,6 +30,7 @@ from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.inputs import STREAM, from_stdin, meshes_of
 from .runtime.options.unwrap import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
+from .runtime.options.words import Names
 from .runtime.progress import Clock
 from .runtime.runfile import Run
 
@@ -82,6 +83,7 @@ def unwrap(
     options: Annotated[Options, CHARTS] = Options(),
     outputs: Annotated[Outputs, FILES] = Outputs(),
     checkpoints: Annotated[CheckpointOptions, Parameter(name="*")] = CheckpointOptions(),
+    compare: Names = (),
     console: Manners = Console(),
 ) -> int:
     """Unwrap meshes or point clouds into an atlas of few charts, an ONNX file and textures each.
@@ -94,6 +96,7 @@ def unwrap(
         options: See Options.
         outputs: See Outputs.
         checkpoints: See CheckpointOptions.
+        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone.
         console: See Console.
     """
     if checkpoints.resume is not None:
@@ -109,10 +112,25 @@ def unwrap(
         missing = "--output" if mesh else "MESH"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
     options = replace(options, padding=_padding(options, outputs))
+    if compare:
+        return _compare(mesh, output, options, compare, console)
     if STREAM in mesh or output == STREAM:
         return _stream(mesh, output, options, outputs, console)
     runs = [Run(path.absolute(), output, options, outputs, checkpoints.every) for path in meshes_of(mesh)]
     return _perform(runs[0], console) if len(runs) == 1 else max(_one_of_several(entry, console) for entry in runs)
+
+
+def _compare(mesh: Sequence[Path], output: Path, options: Options, words: Sequence[str], console: Console) -> int:
+    """A table and a sheet of each mesh with several numbers of charts."""
+    from .bake.pictures.comparison import compare
+
+    for path in meshes_of(mesh):
+        with console.progress() as progress:
+            asset = load(path, options.select)
+            found = compare(options, words, lambda each, asset=asset: unwrap_asset(asset, each, progress))
+        console.show({}, [found.write(output / f"{asset.stem}.compare.png", force=console.force)])
+        sys.stdout.write("" if console.quiet else found.table)
+    return 0
 
 
 def _one_of_several(run: Run, console: Console) -> int:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
     """The search with seams closed where that pays, and as far as the bounds on charts and stretch ask for it."""
     closing, price = config.closing, config.slit.price
-    bounds = Bounds(charts, config.stretch or config.most_excess)
+    asked = config.stretch or len(search.pieces) > charts
+    bounds = Bounds(charts, config.stretch or config.most_excess, 0.0 if asked else closing.waste)
     if config.stretch:
         opened_up(search, bounds.excess, config, late)
-    asked = config.stretch or len(search.pieces) > charts
     Closing(search, bounds, closing, late).close(price, closing.tries_asked if asked else closing.tries)
     if not late():
         search = with_straight_seams(search)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from ...runtime.deadline import Late, never
 from ...runtime.geometry.cutgraph import cut_chains
@@ -37,10 +38,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bounds:
-    """What closing must keep.  charts: so many are asked for.  excess: mean excess energy of the part at most."""
+    """What closing must keep.
+
+    charts: so many are asked for.  excess: mean excess energy of the part at most.  waste: what it costs, in excess
+    energy, where the convex hulls of charts grow by the area of the part: a page holds sprawling charts badly.
+    """
 
     charts: int
     excess: float
+    waste: float = 0.0
 
 
 class Run(NamedTuple):
@@ -118,9 +124,13 @@ class Closing:
         part = self.tried[run.name]
         if part is None:
             return np.inf
-        before = sum(self.search.pieces[key].energy for key in run.sides)
+        sides = [self.search.pieces[key] for key in run.sides]
         saved = run.saved - part.rim
-        return part.piece.energy - before - price * saved if np.isfinite(price) else -saved
+        if not np.isfinite(price):
+            return -saved
+        wasted = hull_area(part.piece) - sum(hull_area(piece) for piece in sides) if self.bounds.waste else 0.0
+        paid = part.piece.energy - sum(piece.energy for piece in sides)
+        return paid + self.bounds.waste * wasted / self.search.area - price * saved
 
     def take(self, run: Run, price: float) -> bool:
         """Replace the pieces beside a run; False, and nothing done, where the bounds are broken."""
@@ -178,6 +188,11 @@ class Closing:
         still = seam.copy()
         still[run.edges] = False
         return valid(search, laid_open(search, ids, still, self.bounds.excess - others), self.config.rounds)
+
+
+def hull_area(piece: Piece) -> float:
+    """Area of the convex hull of a chart, units squared."""
+    return float(ConvexHull(piece.flat.uv).volume)  # in the plane, scipy's volume is the area
 
 
 def path_length(search: Search, edges: NDArray[np.int64]) -> float:

@@ -11,6 +11,9 @@ class ClosingConfig:
 
     charts: int = 8
     """Charts that the search aims at before seams are closed, whatever is asked for."""
+    waste: float = 0.02
+    """Excess energy that a convex hull of charts larger by the area of a part has to save, unless few charts or short
+    seams are asked for."""
     shares: tuple[float, ...] = (1.0, 0.5, 0.25, 0.05)
     """Lengths of the runs tried, as shares of the chain that they are part of."""
     least: int = 1
