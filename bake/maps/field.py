@@ -14,6 +14,7 @@ import numpy as np
 import onnxruntime
 
 from ...runtime.errors import InputError, MissingFileError, ShapeError
+from ...runtime.sessions.modelcheck import check_model
 from ...runtime.sessions.modelerrors import MODEL_ERRORS
 from ..bakemap import BakeMap
 
@@ -46,8 +47,10 @@ class FieldSession:
         _check_file(self.path)
         options = onnxruntime.SessionOptions()
         options.log_severity_level = 4
+        content = self.path.read_bytes()
+        check_model(content, str(path), operators=None)
         try:
-            self._session = onnxruntime.InferenceSession(self.path, options, providers=["CPUExecutionProvider"])
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
         except MODEL_ERRORS as error:
             reason = str(error).splitlines()[0][:200]
             raise InputError(f"{path}: no usable ONNX model ({reason}), {_EXPECTED}; {_REMEDY}") from error

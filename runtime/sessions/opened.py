@@ -16,6 +16,7 @@ import onnxruntime
 from ..errors import BundleError, InputError, MissingDependencyError, MissingFileError
 from .bundle import METADATA_KEY, BundleMetadata
 from .chunks import checked_chunk, checked_threads
+from .modelcheck import check_model
 from .modelerrors import MODEL_ERRORS
 
 if TYPE_CHECKING:
@@ -149,14 +150,16 @@ def _check_available(providers: Sequence[str]) -> None:
 def _load(
     path: Path, providers: Sequence[str], replaced: Mapping[str, onnxruntime.OrtValue]
 ) -> onnxruntime.InferenceSession:
-    """The model with some initializers replaced; the caller keeps those alive."""
+    """The model, checked, with some initializers replaced; the caller keeps those alive."""
+    content = path.read_bytes()
+    check_model(content, str(path))
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
     options.intra_op_num_threads = 1  # chunks are shared out, see chunks.py
     for name, value in replaced.items():
         options.add_initializer(name, value)
     try:
-        return onnxruntime.InferenceSession(path, options, providers=list(providers), enable_fallback=0)
+        return onnxruntime.InferenceSession(content, options, providers=list(providers), enable_fallback=0)
     except (*MODEL_ERRORS, UnicodeDecodeError) as error:
         raise BundleError(f"{path}: no usable ONNX model, expected an exported file; {_REMEDY}") from error
 
