@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from ...runtime.errors import FlexparaError, InputError
-from ...runtime.io.pictures import MAX_PIXELS, inside
+from ...runtime.io.pictures import demand_texels, inside
 from ..color import srgb_from_linear
 
 if TYPE_CHECKING:
@@ -64,9 +64,10 @@ def picture_file(folder: Path, name: str, size: int) -> str:
         return as_webp(_of_exr(path), size)
     try:
         with Image.open(path, formats=("PNG", "JPEG", "WEBP")) as image:
-            if image.width * image.height > MAX_PIXELS:
-                raise InputError(f"{name} has {image.width} × {image.height} pixels, at most {MAX_PIXELS} are read")
+            demand_texels(image.width, image.height)
             return as_webp(image, size)
+    except InputError:
+        raise
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError(f"{name} is no picture that is read ({error}); unwrap the mesh again") from error
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import MeshError
 from ..extras import requires
-from .pictures import MAX_PIXELS
+from .limits import limits
+from .pictures import demand_texels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +22,7 @@ def decode_ktx2(data: bytes) -> NDArray[np.uint8]:
     """The largest level of a KTX 2 file: (h, w, 4) uint8 as stored, row 0 = top.
 
     Raises:
-        MeshError: damaged, not of Basis Universal, of high dynamic range, or of more than MAX_PIXELS pixels.
+        MeshError: damaged, not of Basis Universal, of high dynamic range, or of more texels than are read.
         MissingDependencyError: flexpara[formats] is absent.
     """
     with requires("formats"):
@@ -29,8 +30,8 @@ def decode_ktx2(data: bytes) -> NDArray[np.uint8]:
 
     try:
         texture = opengl_basisu.open(data)
-        if texture.width * texture.height > MAX_PIXELS:
-            raise MeshError(f"{texture.width} × {texture.height} pixels, at most {MAX_PIXELS} are read; scale it down")
+        demand_texels(texture.width, texture.height)
+        limits().demand_unpacked(4 * texture.width * texture.height, len(data), "a texture")
         return np.ascontiguousarray(texture.transcode(opengl_basisu.Target.RGBA8).data, dtype=np.uint8)
     except opengl_basisu.BasisuError as error:
         raise MeshError(f"{error}, expected KTX 2 of Basis Universal with 8 bits; encode it again") from error

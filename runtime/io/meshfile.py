@@ -19,6 +19,7 @@ from ..mesh import Asset
 from .clean.clean import clean
 from .colors import as_rgba
 from .gltf.scene import read_gltf
+from .limits import limits, raised
 from .obj.read import read_obj
 from .off import read_off
 from .pictures import read_in_folder
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     MeshLike = str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike]
-
-MAX_BYTES = 8 << 30
 
 
 def load_asset(path: Path, *, instances: bool = False, select: Sequence[str] = ()) -> Asset:
@@ -58,8 +57,9 @@ def load_asset(path: Path, *, instances: bool = False, select: Sequence[str] = (
         raise MeshError(f"{path} is a folder, expected a mesh file; name the file in it")
     if not path.is_file():
         raise MissingFileError(f"{path} does not exist, expected a mesh file; check the path")
-    if path.stat().st_size > MAX_BYTES:
-        raise MeshError(f"{path} has {path.stat().st_size} bytes, at most {MAX_BYTES} are read; decimate the mesh")
+    most = limits().bytes
+    if path.stat().st_size > most:
+        raise MeshError(f"{path} has {path.stat().st_size} bytes, at most {most} are read; {raised('bytes')}")
     if is_cloud(path):
         raise MeshError(
             f"{path} holds points and no faces, expected triangles; flexpara unwrap takes point clouds, "

@@ -22,6 +22,7 @@ from trimesh.resolvers import Resolver
 from ..errors import InputError, MeshError, MissingDependencyError
 from ..material import Material, Picture, seen_through
 from .colors import as_rgba
+from .limits import limits, raised
 from .pictures import picture_pixels, read_in_folder
 from .rawmesh import RawMesh, merge, transformed, unit_vectors
 
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-MAX_BYTES = 8 << 30
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
 REMEDY = "pip install 'flexpara[formats]', or convert the file"
 MADE_UP_GREY = [102, 102, 102, 255]
@@ -59,14 +59,16 @@ def read_with_trimesh(data: bytes, path: Path) -> RawMesh:
 
 
 def _check_archive(data: bytes) -> None:
-    """Refuse an archive that unpacks to more than MAX_BYTES."""
+    """Refuse an archive that unpacks to more than is read."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
     except zipfile.BadZipFile as error:
         raise MeshError("the file is no zip archive, as its format asks; export it again") from error
-    if size > MAX_BYTES:
-        raise MeshError(f"the file unpacks to {size} bytes, at most {MAX_BYTES} are read; decimate the mesh")
+    most = limits()
+    most.demand_unpacked(size, len(data), "the archive")
+    if size > most.bytes:
+        raise MeshError(f"the file unpacks to {size} bytes, at most {most.bytes} are read; {raised('bytes')}")
 
 
 class _FolderResolver(Resolver):

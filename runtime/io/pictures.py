@@ -15,13 +15,13 @@ import numpy as np
 from PIL import Image
 
 from ..errors import MeshError
+from .limits import limits, raised
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-MAX_PIXELS = 16384 * 16384
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 """Kinds of pictures that are opened.  Pillow knows others, some of which start programs or are hardly used."""
 BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
@@ -57,10 +57,11 @@ def inside(folder: Path, name: str) -> Path | None:
 def decode_image(data: bytes) -> NDArray[np.uint8]:
     """Picture file → (h, w, 4) uint8 sRGB, row 0 = top.
 
-    Raises: MeshError for bytes that are no picture, or more than MAX_PIXELS pixels.
+    Raises: MeshError for bytes that are no picture, or more texels than are read.
     """
     try:
-        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+        with _opened(data) as image:
+            limits().demand_unpacked(4 * image.width * image.height, len(data), "a texture")
             return picture_pixels(image)
     except MeshError:
         raise
@@ -68,15 +69,29 @@ def decode_image(data: bytes) -> NDArray[np.uint8]:
         raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
 
 
+def _opened(data: bytes) -> Image.Image:
+    """A picture of which but the head is read.  Pillow's own limit on pixels stands aside: ours follows."""
+    theirs, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        return Image.open(io.BytesIO(data), formats=FORMATS)
+    finally:
+        Image.MAX_IMAGE_PIXELS = theirs
+
+
+def demand_texels(width: int, height: int) -> None:
+    """Raises: MeshError for a texture of more texels than the limits in force allow."""
+    most = limits().texels
+    if width * height > most:
+        remedy = f"scale it down, or {raised('texels')}"
+        raise MeshError(f"a texture has {width} × {height} pixels, at most {most} are read; {remedy}")
+
+
 def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
     """Opened picture → (h, w, 4) uint8 sRGB, row 0 = top.
 
-    Raises: MeshError where it is damaged or has more than MAX_PIXELS pixels.
+    Raises: MeshError where it is damaged or has more texels than are read.
     """
-    if image.width * image.height > MAX_PIXELS:
-        raise MeshError(
-            f"a texture has {image.width} × {image.height} pixels, at most {MAX_PIXELS} are read; scale it down"
-        )
+    demand_texels(image.width, image.height)
     try:
         return np.asarray(image.convert("RGBA"), dtype=np.uint8)
     except BROKEN as error:

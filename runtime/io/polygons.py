@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import MeshError
+from .limits import limits, raised
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -81,9 +82,14 @@ def triangulate(
         (f, 3) int64 numbers of corners, in [0, c), and (f,) int64 the polygon of each triangle.
     """
     triangles, polygon = fans(size)
-    start = np.cumsum(size) - size
+    start, most = np.cumsum(size) - size, limits().corners
     for index in np.flatnonzero(_turned_fans(points, corners, size, triangles, polygon)):
         first, count = int(start[index]), int(size[index])
+        if count > most:
+            raise MeshError(
+                f"polygon {index} has {count} corners and is not convex, at most {most} are cut into triangles; "
+                f"triangulate it in your program, or {raised('corners')}"
+            )
         own = corners[first : first + count]
         triangles[polygon == index] = first + clip_ears(in_its_plane(points[own]))
     return triangles, polygon

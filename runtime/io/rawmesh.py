@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..material import Material
+from .limits import limits, raised
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from .obj.text import ObjText
 
 LARGEST_DIAGONAL = 1e100  # beyond, areas leave the range of float64
-MAX_FACES = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,7 @@ def check(raw: RawMesh) -> None:
         raise MeshError(
             f"the mesh is empty ({vertex_count} vertices, {face_count} faces), expected triangles; check the export"
         )
-    if face_count > MAX_FACES:
-        raise MeshError(f"{face_count} faces, at most {MAX_FACES} are read; decimate the mesh or split it")
+    demand_few(face_count, vertex_count)
     outside = ((raw.faces < 0) | (raw.faces >= vertex_count)).any(axis=1)
     if outside.any():
         first = int(np.argmax(outside))
@@ -86,6 +85,14 @@ def check(raw: RawMesh) -> None:
     largest = float(np.abs(raw.positions[used]).max())
     if largest > LARGEST_DIAGONAL:
         raise MeshError(f"coordinates reach {largest:.3g}, expected at most {LARGEST_DIAGONAL:g}; choose another unit")
+
+
+def demand_few(faces: int, vertices: int) -> None:
+    """Raises: MeshError for more faces or vertices than the limits in force allow."""
+    most = limits()
+    for name, count, allowed in (("faces", faces, most.faces), ("vertices", vertices, most.vertices)):
+        if count > allowed:
+            raise MeshError(f"{count} {name}, at most {allowed} are read; decimate the mesh, or {raised(name)}")
 
 
 def with_vertices(part: RawMesh, chosen: NDArray[np.int64], faces: NDArray[np.int64]) -> RawMesh:

@@ -16,8 +16,9 @@ from urllib.parse import unquote
 import numpy as np
 
 from ...errors import MeshError
+from ..limits import limits
 from ..pictures import inside
-from ..rawmesh import MAX_FACES, to_float64
+from ..rawmesh import to_float64
 from .compression import DRACO, MESHOPT, decode_view, meshopt_of
 
 if TYPE_CHECKING:
@@ -150,11 +151,13 @@ def stored_accessor(file: GltfFile, index: int) -> NDArray[Any]:
     """(count, columns) as stored: of the accessor's component type, whatever it means."""
     accessor = file.tree["accessors"][index]
     dtype, columns, count = COMPONENTS[accessor["componentType"]], COLUMNS[accessor["type"]], accessor["count"]
-    if not 0 < count <= 3 * MAX_FACES:
+    most = limits()
+    if not 0 < count <= 3 * most.faces:
         raise MeshError(
-            f"glTF accessor {index} holds {count} elements, expected 1 to {3 * MAX_FACES}; export the file again"
+            f"glTF accessor {index} holds {count} elements, expected 1 to {3 * most.faces}; export the file again"
         )
     width = np.dtype(dtype).itemsize * columns
+    most.demand_unpacked(count * width, sum(map(len, file.buffers)), f"glTF accessor {index}")
     if "bufferView" in accessor:
         data, view = buffer_view(file, accessor["bufferView"])
         values = _table(data, accessor.get("byteOffset", 0), view.get("byteStride", width), count, dtype, columns)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import MeshError
 from ...extras import requires
-from ..rawmesh import MAX_FACES
+from ..limits import limits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,8 +45,10 @@ def decode_view(data: bytes, extension: Mapping[str, Any]) -> bytes:
 
     count, stride, mode = int(extension["count"]), int(extension["byteStride"]), extension["mode"]
     name = extension.get("filter", "NONE")
-    if not (0 < count <= 3 * MAX_FACES and 0 < stride <= 256):
+    most = limits()
+    if not (0 < count <= 3 * most.faces and 0 < stride <= 256):
         raise MeshError(f"a compressed glTF buffer has {count} elements of {stride} bytes; export the file again")
+    most.demand_unpacked(count * stride, len(data), "a compressed glTF buffer")
     try:
         if mode == "ATTRIBUTES":
             raw = meshoptimizer.decode_vertex_buffer(count, stride, data, dtype=np.dtype((np.void, stride)))

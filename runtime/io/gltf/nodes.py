@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import MeshError
-from ..rawmesh import MAX_FACES
+from ..limits import limits, raised
 from .buffers import GltfFile, read_accessor
 
 if TYPE_CHECKING:
@@ -175,8 +175,10 @@ def _instances(file: GltfFile, node: dict[str, Any]) -> list[NDArray[np.float64]
     if not known:
         return [np.eye(4)]
     count = len(next(iter(known.values())))
-    if count > MAX_FACES or any(len(values) != count for values in known.values()):
-        raise MeshError("a glTF node has instance attributes of different lengths, or too many; export the file again")
+    if count > limits().nodes:
+        raise MeshError(f"{count} instances of a glTF node, at most {limits().nodes} are read; {raised('nodes')}")
+    if any(len(values) != count for values in known.values()):
+        raise MeshError("a glTF node has instance attributes of different lengths; export the file again")
     move = known.get("TRANSLATION", np.zeros((count, 3)))
     turn = known.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
     size = known.get("SCALE", np.ones((count, 3)))

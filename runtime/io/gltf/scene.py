@@ -13,8 +13,9 @@ import numpy as np
 
 from ...errors import MeshError
 from ..colors import linear_to_srgb
+from ..limits import limits
 from ..polygons import strip_triangles
-from ..rawmesh import MAX_FACES, RawMesh, merge, transformed
+from ..rawmesh import RawMesh, demand_few, merge, transformed
 from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor, read_buffers
 from .columns import primitive_columns
 from .compression import DRACO, decode_draco
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from ...material import Material
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+VERTEX_BYTES = 100
+"""That a vertex takes in memory, about."""
 
 
 def read_gltf(data: bytes, folder: Path, *, instances: bool = False, select: Sequence[str] = ()) -> RawMesh:
@@ -56,9 +59,10 @@ def read_gltf(data: bytes, folder: Path, *, instances: bool = False, select: Seq
 
 def _scene(file: GltfFile, select: Sequence[str], *, instances: bool) -> RawMesh:
     materials, changes = read_materials(file)
+    most = limits()
     placements = select_placements(file.tree, placed_meshes(file), select)
     chosen = [entry for entry in placements if entry.first] if instances else best_placements(placements)
-    found, parts, skipped, faces = [], [], 0, 0
+    found, parts, skipped, faces, vertices = [], [], 0, 0, 0
     for placement in chosen:
         for number, primitive in enumerate(file.tree["meshes"][placement.mesh]["primitives"]):
             if primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP, FAN):
@@ -68,9 +72,9 @@ def _scene(file: GltfFile, select: Sequence[str], *, instances: bool) -> RawMesh
             raw = raw if instances else _numbered(raw, len(parts), placement.mesh)
             found.append(transformed(raw, placement.world))
             parts.append(Part(placement.mesh, number, placement.world))
-            faces += len(raw.faces)
-            if faces > MAX_FACES:
-                raise MeshError(f"the glTF scene has over {MAX_FACES} faces; decimate the meshes or split the scene")
+            faces, vertices = faces + len(raw.faces), vertices + len(raw.positions)
+            demand_few(faces, vertices)
+            most.demand_unpacked(VERTEX_BYTES * vertices, sum(map(len, file.buffers)), "the scene's vertices")
     if not found:
         what = "points or lines only (give points as .ply, .xyz or .npy)" if skipped else "no mesh"
         raise MeshError(f"the glTF scene holds {what}, expected triangles; check the export")

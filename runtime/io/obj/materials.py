@@ -13,6 +13,9 @@ from ..text import finite, lines_of, shown
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ...material import Slot, Wrap
 
 SLOTS: dict[str, Slot] = {"map_kd": "base-color", "map_ke": "emissive", "norm": "normal"}
@@ -35,16 +38,27 @@ def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[
         else:
             current[key.lower()] = rest.strip()
     materials: dict[str, Material] = {}
+    known: dict[str, NDArray[np.uint8] | None] = {}  # many materials may name one picture
     missing = 0
     for name, fields in raw.items():
         pictures: dict[Slot, Picture] = {}
         for key, slot in SLOTS.items():
-            picture = read_sibling(_map_name(fields[key])) if fields.get(key) else None
+            picture = _pixels(_map_name(fields[key]), read_sibling, known) if fields.get(key) else None
             missing += bool(fields.get(key)) and picture is None
             if picture is not None:
-                pictures[slot] = Picture(decode_image(picture), _mtl_wrap(fields[key]))
+                pictures[slot] = Picture(picture, _mtl_wrap(fields[key]))
         materials[name] = _mtl_material(name, fields, pictures)
     return materials, missing
+
+
+def _pixels(
+    name: str, read_sibling: Callable[[str], bytes | None], known: dict[str, NDArray[np.uint8] | None]
+) -> NDArray[np.uint8] | None:
+    """A picture beside the file, decoded once; None where it is absent.  known grows."""
+    if name not in known:
+        data = read_sibling(name)
+        known[name] = None if data is None else decode_image(data)
+    return known[name]
 
 
 def _mtl_material(name: str, fields: Mapping[str, str], pictures: Mapping[Slot, Picture]) -> Material:

@@ -252,5 +252,6 @@ def _materials(
     names = ["default", *lines.text["usemtl"]]
     used = np.searchsorted(lines.number["usemtl"], at_line)
     distinct = list(dict.fromkeys(names[index] for index in dict.fromkeys(used.tolist())))
-    place = np.array([distinct.index(name) if name in distinct else -1 for name in names], dtype=np.int64)
+    number = {name: index for index, name in enumerate(distinct)}
+    place = np.array([number.get(name, -1) for name in names], dtype=np.int64)
     return tuple(known.get(name, Material(name=name)) for name in distinct), place[used]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
+from ..limits import limits
 from ..text import is_number, lines_of, number_table
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
             sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}
             wanted = [name for name in sizes if len(sizes) == 1 or name in ("points", "normals", "colors")]
             total = sum(sizes[name] for name in wanted)
+            limits().demand_unpacked(total, len(data), "the archive")
             if total > MAX_BYTES:
                 raise InputError(f"it unpacks to {total} bytes, at most {MAX_BYTES} are read; thin the points out")
             if len(sizes) > 1 and "points" not in sizes:

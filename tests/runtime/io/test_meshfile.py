@@ -154,7 +154,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 
 def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flexpara.runtime.io.others.MAX_BYTES", 10_000)
+    monkeypatch.setenv("FLEXPARA_LIMITS", "bytes=10000")
     monkeypatch.setattr("flexpara.runtime.io.others.mesh_loaders", {"3mf": None, "3dxml": dict})
     with zipfile.ZipFile(tmp_path / "a.3dxml", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("big", b"\0" * 1_000_000)

@@ -35,7 +35,7 @@ def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPat
         decode_image(whole[: len(whole) // 2])
     with pytest.raises(MeshError, match="no picture that is read"):
         decode_image(b"GIF?")
-    monkeypatch.setattr("flexpara.runtime.io.pictures.MAX_PIXELS", 64 * 64 - 1)
+    monkeypatch.setenv("FLEXPARA_LIMITS", f"texels={64 * 64 - 1}")
     with pytest.raises(MeshError, match="64 × 64 pixels"):
         decode_image(whole)
 

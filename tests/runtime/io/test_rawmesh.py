@@ -7,7 +7,8 @@ import pytest
 
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.clean.clean import clean
-from flexpara.runtime.io.rawmesh import MAX_FACES, RawMesh, check, merge, split_at_corners, transformed
+from flexpara.runtime.io.limits import Limits
+from flexpara.runtime.io.rawmesh import RawMesh, check, merge, split_at_corners, transformed
 from flexpara.runtime.material import Material
 from flexpara.runtime.samples import make_sample
 
@@ -16,7 +17,7 @@ SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0,
 
 
 def test_too_many_faces_are_refused() -> None:
-    faces = np.broadcast_to(np.array([0, 1, 2]), (MAX_FACES + 1, 3))
+    faces = np.broadcast_to(np.array([0, 1, 2]), (Limits().faces + 1, 3))
     with pytest.raises(MeshError, match="decimate"):
         check(RawMesh(positions=TRIANGLE, faces=faces))
 
