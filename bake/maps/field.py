@@ -54,7 +54,10 @@ class FieldSession:
         except MODEL_ERRORS as error:
             reason = str(error).splitlines()[0][:200]
             raise InputError(f"{path}: no usable ONNX model ({reason}), {_EXPECTED}; {_REMEDY}") from error
-        self.output = _checked_signature(self._session, self.path)
+        try:
+            self.output = _checked_signature(self._session, self.path)
+        except UnicodeDecodeError as error:
+            raise InputError(f"{path}: names that are no text, {_EXPECTED}; {_REMEDY}") from error
 
     def evaluate(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """(n, c) float32 values at points (n, 3) float32 in source units; n = 0 gives (0, 1).

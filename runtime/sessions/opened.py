@@ -72,8 +72,11 @@ def open_bundle(
     _check_available(providers)
     zero = onnxruntime.OrtValue.ortvalue_from_numpy(np.zeros(3, dtype=np.float32))
     session = _load(path, providers, dict.fromkeys(CENTRES, zero))
-    metadata = _read_metadata(session, path)
-    _check_signature(session, path, inputs, outputs)
+    try:
+        metadata = _read_metadata(session, path)
+        _check_signature(session, path, inputs, outputs)
+    except UnicodeDecodeError as error:
+        raise BundleError(f"{path}: names or metadata that are no text, expected UTF-8; {_REMEDY}") from error
     _check_used(session, providers)
     return Opened(session, metadata, zero, path)
 

@@ -120,7 +120,10 @@ def _worlds(nodes: Sequence[dict[str, Any]], roots: Sequence[int]) -> dict[int, 
             raise MeshError(
                 f"glTF node {index} has several parents or is its own ancestor, expected a tree; export again"
             )
-        world[index] = parent @ _local_matrix(nodes[index])
+        with np.errstate(over="ignore", invalid="ignore"):
+            world[index] = parent @ _local_matrix(nodes[index])
+        if not np.isfinite(world[index]).all():
+            raise MeshError(f"glTF node {index} stands beyond all numbers, expected finite ones; export the file again")
         waiting += [(child, world[index]) for child in reversed(nodes[index].get("children", []))]
     return world
 

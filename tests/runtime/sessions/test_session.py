@@ -301,3 +301,10 @@ def test_text_that_is_none_inside_a_model_is_refused(tmp_path: Path, capfd: pyte
     with pytest.raises(BundleError, match="uses the operator"):
         UnwrapSession(tmp_path / "a.onnx")
     assert tuple(capfd.readouterr()) == ("", "")
+
+
+def test_metadata_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    content = closed_form({METADATA_KEY: FACTS.to_json()})
+    (tmp_path / "a.onnx").write_bytes(content.replace(b'"seed":3', b'"see\xff":3'))
+    with pytest.raises(BundleError, match="no text"):
+        UnwrapSession(tmp_path / "a.onnx")
