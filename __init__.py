@@ -126,7 +126,7 @@ def unwrap_asset(
     with requires("unwrap"):
         from .export.assemble import assemble
         from .runtime.io.shading import shaded
-        from .runtime.pack.density import square_of
+        from .runtime.pack.square import square_of
         from .train.presets import train_asset
 
     clock, asset = Clock.of(progress), shaded(asset, options.crease_angle)
@@ -158,7 +158,7 @@ def unwrap_cloud(
 
     with requires("unwrap"):
         from .export.assemble import assemble
-        from .runtime.pack.density import square_of
+        from .runtime.pack.square import square_of
         from .train.presets import train_cloud
 
     clock = Clock.of(progress)

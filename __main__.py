@@ -288,7 +288,7 @@ def export(
         check_outputs(folder, outputs, chosen_maps(outputs))
         with requires("unwrap"):
             from .export.assemble import assemble
-            from .runtime.pack.density import square_of
+            from .runtime.pack.square import square_of
             from .train.saved import read_trained
         with console.progress() as progress:
             found = assemble(asset, read_trained(trained, asset), Clock(progress), square_of(options))

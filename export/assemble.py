@@ -15,8 +15,8 @@ from .. import __version__
 from ..runtime.errors import FinishError
 from ..runtime.geometry.metrics import measure
 from ..runtime.mesh import Surface
+from ..runtime.pack.asked import pack_asked
 from ..runtime.pack.config import PackConfig
-from ..runtime.pack.density import Square, pack_square
 from ..runtime.pack.packing import Packed
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
+    from ..runtime.pack.square import Square
     from ..runtime.progress import Clock
     from ..train.deploy.gated import GatedExperts
     from ..train.pipeline import Trained
@@ -67,7 +68,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
         trained, packed = _valid_atlas(asset, trained, clock, square)
     atlas, size = packed.atlas, square.size
     with clock.stage("measure"):
-        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
+        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size, stack=atlas.face_stack)
     report: dict[str, Any] = {
         "format_version": REPORT_VERSION,
         "version": __version__,
@@ -110,7 +111,7 @@ def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, square: Square) -
     """
     seed, config = trained.settings["seed"], PackConfig()
     trained = _with_whole_polygons(asset, trained, clock)
-    packed = pack_square(asset, trained.charts, square, seed, config)
+    packed = pack_asked(asset, trained.charts, square, seed, config)
     for _ in range(config.recuts):
         if len(packed.invalid) == 0:
             return trained, packed
@@ -122,7 +123,7 @@ def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, square: Square) -
         )
         report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
         trained = replace(trained, charts=charts, networks=networks, report=report)
-        packed = pack_square(asset, charts, square, seed, config)
+        packed = pack_asked(asset, charts, square, seed, config)
     if len(packed.invalid):
         raise FinishError(
             f"{len(packed.invalid)} charts are not valid as written after {config.recuts} attempts, expected none; "

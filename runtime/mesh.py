@@ -158,8 +158,9 @@ class Atlas:
     `pack` made them, so that 1 − v is exact.  normals: (n, 3) float32 unit.
     face_chart: (f,) int64.  source_vertex: (n,) int64 into Asset.positions.
     size: texels per side.  padding: texels kept free around each chart (so two charts are 2 × padding apart).
-    placement: (k, 2, 3) float64, chart coordinates → atlas uv (a similarity, same scale for all charts), or None
-    when the uv came from elsewhere.
+    placement: (k, 2, 3) float64, chart coordinates → atlas uv (a similarity, same scale for all charts; rectangles that
+    were asked to fill whole texels lose a part of a texel), or None when the uv came from elsewhere.
+    stack: (k,) int64, the chart that each lies on where congruent charts share their place; None where none does.
     """
 
     positions: NDArray[np.float64]
@@ -171,11 +172,19 @@ class Atlas:
     size: int
     padding: int
     placement: NDArray[np.float64] | None = None
+    stack: NDArray[np.int64] | None = None
 
     @property
     def corner_uv(self) -> NDArray[np.float64]:
         """(f, 3, 2) float64: the uv as written (float32 values)."""
         return self.uv[self.faces].astype(np.float64)
+
+    @property
+    def face_stack(self) -> NDArray[np.int64] | None:
+        """(f,) int64 the chart beneath each face, its own where it lies lowest; None where no chart lies on another."""
+        if self.stack is None:
+            return None
+        return np.append(self.stack, np.arange(len(self.stack), self.face_chart.max() + 1))[self.face_chart]
 
 
 Report = dict[str, Any]

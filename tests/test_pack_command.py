@@ -134,5 +134,22 @@ def test_a_mesh_without_uv_is_refused_with_the_remedy(tmp_path: Path, capsys: py
     assert not (tmp_path / "out").exists()
 
 
+def test_congruent_islands_share_their_texels_and_that_is_said(
+    house: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--maps", "none", "--stack", "identical", "--rotation", "90", "--whole-texels")
+    assert main(["pack", str(house), "-o", str(tmp_path / "out"), "--size", "64", *words]) == 0
+    assert "1 islands lie on others" in capsys.readouterr().err
+    report = json.loads((tmp_path / "out" / "house.report.json").read_text(encoding="utf-8"))
+    assert report["pack"]["stacked"] == 1
+    assert report["metrics"]["overlap_fraction"] == 0.0
+    made = load_asset(tmp_path / "out" / "house.obj")
+    assert made.uv is not None
+    corner_uv = made.uv[made.faces]
+    assert np.ptp(corner_uv[:2].reshape(-1, 2), axis=0).min() > 0.9
+    assert np.allclose(np.sort(corner_uv[:2].reshape(-1, 2), axis=0), np.sort(corner_uv[2:].reshape(-1, 2), axis=0))
+    assert np.allclose(64.0 * corner_uv, np.rint(64.0 * corner_uv), atol=1e-5)
+
+
 def test_networks_are_refused(house: Path, tmp_path: Path) -> None:
     assert packed(house, out=tmp_path / "out", words=("--inverse",)) == 2

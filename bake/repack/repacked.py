@@ -13,8 +13,8 @@ from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
 from ...runtime.options.keywords import from_keywords
 from ...runtime.options.pack import PackOptions, PackOutputs
-from ...runtime.pack.density import square_of
 from ...runtime.pack.repack import repack
+from ...runtime.pack.square import square_of
 from ...runtime.progress import Clock
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
@@ -105,7 +105,9 @@ class PackResult:
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
         cut = {"polygons_cut": report.pop("polygons_cut")}
         report["changes"] = {**report["changes"], **(cut if any(cut.values()) else {})}
-        for fact in (*told(cut), *texture_notes(report["textures"])):
+        stacked = self.report["pack"].get("stacked", 0)
+        shared = [f"{stacked} islands lie on others and share their texels"] if stacked else []
+        for fact in (*told(cut), *shared, *texture_notes(report["textures"])):
             note(f"{self.asset.stem}: {fact}")
         output.write_report({**report, "seconds": clock.rounded})
         return output.commit()
@@ -157,7 +159,8 @@ def pack_assets(
     with clock.stage("pack"):
         packed = repack(whole, square_of(options), equal=options.density == "equal", seed=options.seed)
     with clock.stage("measure"):
-        metrics = measure(whole.surface, packed.atlas.corner_uv, packed.atlas.face_chart, size=options.size)
+        atlas = packed.atlas
+        metrics = measure(whole.surface, atlas.corner_uv, atlas.face_chart, size=options.size, stack=atlas.face_stack)
     changes = [asset.changes for asset in assets] + [packed.report["changes"]]
     report = {
         "version": __version__,

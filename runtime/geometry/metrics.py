@@ -91,6 +91,7 @@ def measure(
     face_chart: NDArray[np.int64] | None = None,
     *,
     size: int | None = None,
+    stack: NDArray[np.int64] | None = None,
 ) -> Metrics:
     """All metrics of one uv layout.
 
@@ -99,6 +100,8 @@ def measure(
         corner_uv: (f, 3, 2) float64, finite, any units (atlas coordinates where size is given).
         face_chart: (f,) int64 labels; None takes the charts that `uv_charts` finds.
         size: texels per uv unit, for texel densities and bleeding.
+        stack: (f,) int64, the chart beneath each face where charts were laid on others on purpose: overlap, gap and
+            packing efficiency are those of the lowest charts, whose faces name their own; None where all are.
 
     Raises:
         ShapeError: corner_uv or face_chart don't fit the surface.
@@ -109,12 +112,13 @@ def measure(
     found, seam = uv_charts(surface.faces, corner_uv, table)
     chart = found if face_chart is None else np.unique(face_chart, return_inverse=True)[1].reshape(-1)
     triangles, scaled_uv, area = _normalized(surface, corner_uv)
-    pairs = overlapping_pairs(corner_uv)
+    lowest = np.flatnonzero(np.ones(len(chart), bool) if stack is None else stack == face_chart)
+    pairs = lowest[overlapping_pairs(corner_uv[lowest])]
     shared = overlap_area(corner_uv, pairs)
     square, square_area = _square(corner_uv)
-    total_uv = float(np.abs(signed_areas(corner_uv)).sum())
+    total_uv = float(np.abs(signed_areas(corner_uv[lowest])).sum())
     meets = bool(np.any(chart[pairs[:, 0]] != chart[pairs[:, 1]]))
-    gap = _gap_texels(corner_uv, chart, _outline(table, seam), meets, size)
+    gap = _gap_texels(corner_uv[lowest], chart[lowest], _outline(table, seam)[lowest], meets, size)
     return Metrics(
         **_distortion_means(triangles, scaled_uv, area),
         **_orientation_counts(corner_uv, chart, area),

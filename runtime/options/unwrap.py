@@ -29,6 +29,8 @@ ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirect
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "gltf", "obj", "ply", "usda", "npz")
 SHARINGS = ("scene", "mesh", "material")
+ROTATIONS = ("off", "90", "any")
+STACKS = ("off", "identical", "mirrored")
 SCENES = ("glb", "gltf")
 """Formats that hold scenes."""
 POLYGONS = ("obj", "ply", "usda")
@@ -149,9 +151,17 @@ class AtlasOptions(SourceOptions):
     """Texels that are kept free around each chart; by default what the target asks for, else size / 256, at least 2."""
     texel_density: float | None = None
     """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
+    rotation: Literal["off", "90", "any"] = "any"
+    """How charts may be turned: not at all, by quarter turns, or first upright and then by quarter turns."""
+    stack: Literal["off", "identical", "mirrored"] = "off"
+    """Charts of one shape to lay over each other, to share their texels: none, identical ones, or mirror images too."""
+    whole_texels: Flag = False
+    """Let the edges of rectangular charts lie between texels; they give up a part of a texel for it."""
 
     def __post_init__(self) -> None:
         SourceOptions.__post_init__(self)
+        demand_known("rotation", self.rotation, ROTATIONS)
+        demand_known("stack", self.stack, STACKS)
         (low, high), most = SIZES, self.size // 8
         demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
         dense = self.texel_density is None or self.texel_density > 0

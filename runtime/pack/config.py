@@ -6,6 +6,12 @@ Shares are of the side of the atlas.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+Rotation: TypeAlias = Literal["off", "90", "any"]
+"""How charts may be turned: not at all, by quarter turns, or first upright and then by quarter turns."""
+Stack: TypeAlias = Literal["off", "identical", "mirrored"]
+"""Which congruent charts are laid over each other: none, those of one shape, those of a shape and its mirror image."""
 
 
 @dataclass(frozen=True)
@@ -125,14 +131,27 @@ class IslandConfig:
 
 
 @dataclass(frozen=True)
-class PackConfig:
-    """All of them."""
+class StackConfig:
+    """What counts as congruent."""
 
+    tolerance: float = 1e-3
+    """How far the outlines of two charts may lie apart, share of the distance from a chart's centre to its border."""
+
+
+@dataclass(frozen=True)
+class PackConfig:
+    """All of them, and what was asked for."""
+
+    rotation: Rotation = "any"
+    stack: Stack = "off"
+    whole_texels: bool = False
+    """Whether the edges of charts that are rectangles lie between texels."""
     place: PlaceConfig = field(default_factory=PlaceConfig)
     nest: NestConfig = field(default_factory=NestConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
     density: DensityConfig = field(default_factory=DensityConfig)
     islands: IslandConfig = field(default_factory=IslandConfig)
+    stacks: StackConfig = field(default_factory=StackConfig)
     recuts: int = 4
     """How often charts that float32 can't hold are cut again and all are packed anew."""

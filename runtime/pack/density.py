@@ -7,33 +7,19 @@ the lower left corner.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .config import PackConfig
 from .lattice import STEPS
-from .outlines import outline_edges
+from .outlines import chart_outlines, outline_edges
 from .packing import Fitted, Packed, as_atlas, on_lattice, pack
+from .texels import aligned
 
 if TYPE_CHECKING:
     from ..mesh import Asset, Charts
-    from ..options.unwrap import AtlasOptions
-
-
-class Square(NamedTuple):
-    """What is asked of an atlas: size and padding in texels; texels per unit of the source, None as many as fit."""
-
-    size: int
-    padding: int
-    texel_density: float | None = None
-
-
-def square_of(options: AtlasOptions) -> Square:
-    """The atlas that options ask for."""
-    return Square(options.size, options.margin, options.texel_density)
+    from .square import Square
 
 
 def pack_square(
@@ -44,7 +30,8 @@ def pack_square(
     Raises: as `pack`; InputError where the atlas is too small for that density.
     """
     config = config or PackConfig()
-    packed = pack(asset, charts, size=square.size, padding=square.padding, seed=seed, config=config)
+    loose = config if square.texel_density is None else replace(config, whole_texels=False)
+    packed = pack(asset, charts, size=square.size, padding=square.padding, seed=seed, config=loose)
     if square.texel_density is None:
         return packed
     most = packed.report["chart_scale"] * square.size
@@ -55,7 +42,7 @@ def pack_square(
             f"texel-density is {wanted:g}, expected at most {most:.4g} in {square.size} texels; pass --size {size} or "
             "a lower density"
         )
-    found = _filled_part(asset, charts, square, packed, seed, config)
+    found = _filled_part(asset, charts, square, packed, seed, loose)
     return _shrunk(asset, charts, square, found, wanted / (found.report["chart_scale"] * square.size), config)
 
 
@@ -90,12 +77,12 @@ def _reached(asset: Asset, charts: Charts, side: float, padding: int, seed: int,
 def _shrunk(asset: Asset, charts: Charts, square: Square, found: Packed, factor: float, config: PackConfig) -> Packed:
     """The charts of an atlas as a part of another: uv × factor."""
     assert found.atlas.placement is not None
-    placement = found.atlas.placement * factor
     edges = outline_edges(asset.surface.faces, charts)
+    placement = aligned(found.atlas.placement * factor, chart_outlines(charts, edges), square.size, config)
     faces, snapped = on_lattice(asset.surface.faces, charts, edges, placement, config)
     fitted = Fitted(placement, found.report["skipped_growth_steps"], snapped, faces, 0.0)
     atlas = as_atlas(asset, charts, fitted, square.size, square.padding)
     report = {**found.report, "settings": asdict(config), "invalid_charts": snapped.invalid.tolist()}
-    report["chart_scale"] = float(np.sqrt(np.linalg.det(placement[0, :, :2])))
+    report["chart_scale"] = found.report["chart_scale"] * factor
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
     return Packed(atlas, snapped.invalid, report)

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .bitmap import Mask, Nest, mask_of, nest
-from .outlines import is_rectangle, rotation
+from .outlines import is_rectangle
+from .outlines import rotation as rotation_by
 from .placement import Layout
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .config import NestConfig
+    from .config import NestConfig, Rotation
 
 
 def find_nested(
@@ -27,6 +28,8 @@ def find_nested(
     padding: float,
     config: NestConfig,
     rng: np.random.Generator,
+    *,
+    rotation: Rotation = "any",
 ) -> Layout | None:
     """The best layout found; None where there are too few or too many charts for it, or the padding leaves no room.
 
@@ -37,13 +40,16 @@ def find_nested(
         padding: share of the atlas side.
         config: numbers.
         rng: for the orders that are tried.
+        rotation: how charts may be turned.
     """
     if not 1 < len(outlines) <= config.most:
         return None
+    quarters = 1 if rotation == "off" else 4
+    slants = 1 if rotation != "any" else config.slants
     unit = config.side * math.sqrt(config.fill / area)
     for _ in range(config.sizings):
         charts = [
-            _masks(*one, unit, padding * config.side * config.more, config)
+            _masks(*one, unit, padding * config.side * config.more, (slants, quarters))
             for one in zip(outlines, folded.tolist(), strict=True)
         ]
         keys = np.array([max(masks[0].width, masks[0].height) for masks in charts], dtype=np.float64)
@@ -56,18 +62,21 @@ def find_nested(
     found = _improved(charts, found, keys, config, rng)
     chosen = found.mask.tolist()
     offset = np.array([masks[number].offset for masks, number in zip(charts, chosen, strict=True)])
-    slants = np.array([len(masks) // 4 for masks in charts])
-    angle = (found.mask // 4) * (0.5 * math.pi / slants) + (found.mask % 4) * (0.5 * math.pi)
+    tried = np.array([len(masks) // quarters for masks in charts])
+    angle = (found.mask // quarters) * (0.5 * math.pi / tried) + (found.mask % quarters) * (0.5 * math.pi)
     return Layout(angle, (found.place + offset) / found.side, unit / found.side)
 
 
-def _masks(outline: NDArray[np.float64], folded: bool, unit: float, padding: float, config: NestConfig) -> list[Mask]:
-    """Four quarter turns of each slant; of a rectangle only those that leave it upright."""
+def _masks(
+    outline: NDArray[np.float64], folded: bool, unit: float, padding: float, turns: tuple[int, int]
+) -> list[Mask]:
+    """So many slants within a quarter turn, and so many quarter turns of each; a rectangle stays upright."""
     masks: list[Mask] = []
-    for slant in range(1 if is_rectangle(outline) else config.slants):
-        angle = slant * 0.5 * math.pi / config.slants
-        masks.append(mask_of(outline @ rotation(angle).T * unit, padding, filled=folded))
-        for _ in range(3):
+    slants, quarters = turns
+    for slant in range(1 if is_rectangle(outline) else slants):
+        angle = slant * 0.5 * math.pi / slants
+        masks.append(mask_of(outline @ rotation_by(angle).T * unit, padding, filled=folded))
+        for _ in range(quarters - 1):
             masks.append(masks[-1].turned)
     return masks
 

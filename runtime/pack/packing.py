@@ -29,6 +29,7 @@ from .nesting import find_nested
 from .outlines import chart_outlines, outline_edges, rotation, upright_angle
 from .placement import Layout, find_layout
 from .seamvertices import atlas_normals, split_vertices
+from .texels import aligned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -84,10 +85,15 @@ def pack(
         if fitted.snapped.farthest <= fitted.slack:
             break
         fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
-    snapped, placement = fitted.snapped, fitted.placement
+    scale = scale_of(fitted.placement)
+    if config.whole_texels:
+        placement = aligned(fitted.placement, chart_outlines(charts, edges), size, config)
+        faces, snapped = on_lattice(asset.surface.faces, charts, edges, placement, config)
+        fitted = fitted._replace(placement=placement, faces=faces, snapped=snapped)
+    snapped = fitted.snapped
     atlas = as_atlas(asset, charts, fitted, size, padding)
     report |= {
-        "chart_scale": scale_of(placement),
+        "chart_scale": scale,
         "skipped_growth_steps": fitted.skipped,
     }
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
@@ -99,13 +105,16 @@ def _placed(
     charts: Charts, outlines: list[NDArray[np.float64]], size: int, padding: int, config: PackConfig, seed: int
 ) -> tuple[list[NDArray[np.float64]], dict[str, Any]]:
     """First placements (k, 2, 3) of the charts, of which the better is to be found, and what limits them."""
-    angles = np.array([upright_angle(outline, square=len(outlines) == 1) for outline in outlines])
+    angles = np.zeros(len(outlines))
+    if config.rotation == "any":
+        angles = np.array([upright_angle(outline, square=len(outlines) == 1) for outline in outlines])
     upright = [outline @ rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
     area = float(np.abs(signed_areas(charts.corner_uv)).sum())
     # a hair more than the padding: charts that touch could not be parted by letting them shrink
     room = padding / size + 4.0 / STEPS
-    layout = find_layout(upright, area, room, config.place, np.random.default_rng(seed))
-    nested = find_nested(upright, _folded(charts), area, room, config.nest, np.random.default_rng(seed))
+    turns, rngs = config.rotation, [np.random.default_rng(seed) for _ in range(2)]
+    layout = find_layout(upright, area, room, config.place, rngs[0], rotation=turns)
+    nested = find_nested(upright, _folded(charts), area, room, config.nest, rngs[1], rotation=turns)
     layouts = [layout] if nested is None else [layout, nested]
     extent = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
     longest = int(extent.argmax())

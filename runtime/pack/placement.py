@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .outlines import rotation
+from .outlines import rotation as rotation_by
 from .skyline import Drop, Profile, drop, profile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .config import PlaceConfig
+    from .config import PlaceConfig, Rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,48 @@ class _Found:
     keys: NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class _Outlines:
+    """Upright outlines (k of (s, 2, 2)) of charts of that area, source units, and how they may be turned.
+
+    long: length of a chart, in sides of a square of the area, from which diagonals are tried.
+    """
+
+    outlines: list[NDArray[np.float64]]
+    area: float
+    rotation: Rotation
+    long: float
+
+    def shapes(self, unit: float, padding: float) -> _Shapes:
+        """Profiles at that size, at each angle they may have."""
+        charts, angles = [], []
+        for outline in self.outlines:
+            long = self.rotation == "any" and np.ptp(outline, axis=(0, 1)).max() > self.long * math.sqrt(self.area)
+            quarters = range(1 if self.rotation == "off" else 2)
+            turns = [0.5 * number for number in quarters]
+            shapes = [profile(outline @ rotation_by(turn * math.pi).T * unit, padding) for turn in turns]
+            turned = [shape.turned for shape in shapes]
+            alike = all(one.looks_like(other) for one, other in zip(shapes, turned, strict=True))
+            if not alike and self.rotation != "off":
+                turns, shapes = [*turns, 1.0, 1.5], [*shapes, *turned]
+            if long:
+                turns = [*turns, 0.25, 0.75]
+                shapes += [profile(outline @ rotation_by(turn * math.pi).T * unit, padding) for turn in turns[-2:]]
+            charts.append(shapes)
+            angles.append(np.array(turns) * math.pi)
+        extent = np.array([max(len(chart[0].low), chart[0].top) for chart in charts])
+        narrowest = max(min(len(shape.low) for shape in chart) for chart in charts)
+        return _Shapes(charts, angles, unit, extent, narrowest)
+
+
 def find_layout(
-    outlines: list[NDArray[np.float64]], area: float, padding: float, config: PlaceConfig, rng: np.random.Generator
+    outlines: list[NDArray[np.float64]],
+    area: float,
+    padding: float,
+    config: PlaceConfig,
+    rng: np.random.Generator,
+    *,
+    rotation: Rotation = "any",
 ) -> Layout:
     """The best layout found.
 
@@ -69,12 +109,13 @@ def find_layout(
         padding: share of the atlas side.
         config: numbers.
         rng: for the orders that are tried.
+        rotation: how charts may be turned.
 
     Raises:
         InputError: the padding leaves no room for the charts.
     """
     columns = int(min(max(config.columns * math.sqrt(len(outlines)), config.least), config.most))
-    shapes, found = _sized(outlines, area, padding, columns, config)
+    shapes, found = _sized(_Outlines(outlines, area, rotation, config.long), padding, columns, config)
     found = _improved(shapes, found, config, rng)
     chosen, rows = found.drop.angle.tolist(), range(len(outlines))
     offset = np.array([shapes.charts[chart][chosen[chart]].offset for chart in rows])
@@ -82,18 +123,15 @@ def find_layout(
     return Layout(angle, (found.drop.origin + offset) / found.side, shapes.unit / found.side)
 
 
-def _sized(
-    outlines: list[NDArray[np.float64]], area: float, padding: float, columns: int, config: PlaceConfig
-) -> tuple[_Shapes, _Found]:
+def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfig) -> tuple[_Shapes, _Found]:
     """Shapes of the size at which a first layout needs almost all of the columns, never more, and that layout.
 
     The padding is a share of the columns: in a square of as many or fewer it is kept.
     """
-    first = unit = columns * math.sqrt(config.fill / area)
-    extent = np.array([np.ptp(outline, axis=(0, 1)).max() for outline in outlines])
-    long = extent > config.long * math.sqrt(area)
-    room = 2.0 * padding * columns * math.sqrt(len(outlines))  # what padding takes does not shrink with the charts
-    shapes = _shapes(outlines, long, unit, padding * columns)
+    k = len(outlines.outlines)
+    first = unit = columns * math.sqrt(config.fill / outlines.area)
+    room = 2.0 * padding * columns * math.sqrt(k)  # what padding takes does not shrink with the charts
+    shapes = outlines.shapes(unit, padding * columns)
     for _ in range(config.sizings):
         found = _first(shapes, columns, config)
         if (1.0 - config.alike) * columns <= found.side <= columns:
@@ -102,11 +140,11 @@ def _sized(
             break
         wanted = ((1.0 - config.alike / 2.0) * columns - room) / max(found.side - room, 1e-9)
         unit *= min(max(wanted, 0.25), 2.0) if room < columns else 0.25
-        shapes = _shapes(outlines, long, unit, padding * columns)
+        shapes = outlines.shapes(unit, padding * columns)
     found = _first(shapes, columns, config)
     if found.side > columns:
         raise InputError(
-            f"{len(outlines)} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
+            f"{k} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
             "texels; lower the padding or raise the size"
         )
     return shapes, found
@@ -124,25 +162,6 @@ def _dropped(shapes: _Shapes, keys: NDArray[np.float64], width: int, tightness: 
     found = drop(shapes.charts, np.argsort(-keys, kind="stable"), width, tightness=tightness)
     assert found is not None, "no chart is wider than the columns"
     return _Found(found, found.side, keys)
-
-
-def _shapes(outlines: list[NDArray[np.float64]], long: NDArray[np.bool_], unit: float, padding: float) -> _Shapes:
-    """Profiles at the four quarter turns, as far as they differ; of long charts (k,) along the diagonals too."""
-    charts, angles = [], []
-    for outline, is_long in zip(outlines, long.tolist(), strict=True):
-        quarters = [profile(outline @ rotation(angle).T * unit, padding) for angle in (0.0, math.pi / 2.0)]
-        turned = [shape.turned for shape in quarters]
-        turns, shapes = [0.0, 0.5], quarters
-        if not all(one.looks_like(other) for one, other in zip(quarters, turned, strict=True)):
-            turns, shapes = [*turns, 1.0, 1.5], [*shapes, *turned]
-        if is_long:
-            turns = [*turns, 0.25, 0.75]
-            shapes = [*shapes, *(profile(outline @ rotation(turn * math.pi).T * unit, padding) for turn in turns[-2:])]
-        charts.append(shapes)
-        angles.append(np.array(turns) * math.pi)
-    extent = np.array([max(len(chart[0].low), len(chart[1].low)) for chart in charts], dtype=np.float64)
-    narrowest = max(min(len(shape.low) for shape in chart) for chart in charts)
-    return _Shapes(charts, angles, unit, extent, narrowest)
 
 
 def _improved(shapes: _Shapes, found: _Found, config: PlaceConfig, rng: np.random.Generator) -> _Found:

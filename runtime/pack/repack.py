@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..mesh import Surface
+from .asked import faces_of, pack_asked
 from .config import PackConfig
-from .density import Square, pack_square
 from .islands import islands_of
 from .packing import Packed, atlas_of_corners
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ..mesh import Asset
+    from .square import Square
 
 FLAT = "flat_islands"
 """Among the changes: islands without area, left in one point."""
@@ -41,22 +38,15 @@ def repack(
         counts these islands, and those that are not valid.
 
     Raises:
-        InputError: there are no uv with an area, or as `pack_square`.
+        InputError: there are no uv with an area, or as `pack_asked`.
     """
     config = config or PackConfig()
     islands = islands_of(asset, equal=equal, config=config.islands)
-    packed = pack_square(_part(asset, islands.faces), islands.charts, square, seed, config)
+    packed = pack_asked(faces_of(asset, islands.faces), islands.charts, square, seed, config)
     report = {**packed.report, "islands": len(islands.charts.method)}
     report["changes"] = {FLAT: islands.flat, INVALID: len(packed.invalid)}
     corner_uv = np.zeros((len(asset.faces), 3, 2), dtype=np.float32)
     corner_uv[islands.faces] = packed.atlas.uv[packed.atlas.faces]
     chart = np.full(len(asset.faces), len(islands.charts.method))
     chart[islands.faces] = islands.charts.face_chart
-    atlas = replace(atlas_of_corners(asset, chart, corner_uv, packed.atlas), placement=packed.atlas.placement)
-    return Packed(atlas, packed.invalid, report)
-
-
-def _part(asset: Asset, faces: NDArray[np.int64]) -> Asset:
-    """The mesh with some of its faces, in their order."""
-    surface = Surface(asset.surface.vertices, asset.surface.faces[faces])
-    return replace(asset, faces=asset.faces[faces], surface=surface, polygons=None)
+    return Packed(atlas_of_corners(asset, chart, corner_uv, packed.atlas), packed.invalid, report)

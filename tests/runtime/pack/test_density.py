@@ -8,7 +8,8 @@ import pytest
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Asset, Charts, Surface
-from flexpara.runtime.pack.density import Square, pack_square
+from flexpara.runtime.pack.density import pack_square
+from flexpara.runtime.pack.square import Square
 
 
 def squares(sides: list[float]) -> tuple[Asset, Charts]:

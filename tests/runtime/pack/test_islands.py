@@ -13,9 +13,9 @@ from flexpara.runtime.geometry.triangles import signed_areas
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset
 from flexpara.runtime.pack.config import IslandConfig
-from flexpara.runtime.pack.density import Square
 from flexpara.runtime.pack.islands import islands_of
 from flexpara.runtime.pack.repack import repack
+from flexpara.runtime.pack.square import Square
 
 SQUARE = Square(256, 2)
 QUAD = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
