@@ -97,7 +97,7 @@ def read_trained(path: Path, asset: Asset) -> Trained:
             raise
         raise _damaged(path, str(error)[:120]) from error
     if len(frame.centre) != 3 or not all(map(math.isfinite, (*frame.centre, frame.scale))) or frame.scale <= 0.0:
-        raise _damaged(path, f"frame is {frame}")
+        raise _damaged(path, f"frame is {str(frame)[:120]}")
     return Trained(charts, networks, frame, settings, report)
 
 

@@ -29,6 +29,10 @@ _MAGIC = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF", re.ASCII)
 BINARY = re.compile(rb"\s*(ST)?(C)?(N)?OFF[ \t]+BINARY[ \t]*\r?\n")
 
 
+LARGEST_NUMBER = 2**40
+"""Beyond, no vertex has such a number."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Words:
     """The file without comments: text of each word, and its line."""
@@ -160,7 +164,7 @@ def _uniform_polygons(words: _Words, place: int, count: int) -> NDArray[np.int64
     if count * width != end - place or set(text[place::width]) != {text[place]}:
         return None
     table = words.numbers(place, end).reshape(count, width)[:, 1:]
-    whole = (table == np.rint(table)) & (np.abs(table) < 2**40)  # beyond, no vertex has such a number
+    whole = (table == np.rint(table)) & (np.abs(table) < LARGEST_NUMBER)
     return table.astype(np.int64) if whole.all() else None
 
 
@@ -176,6 +180,11 @@ def _polygon(words: _Words, place: int, index: int) -> list[int]:
             f"face {index} of the OFF file is not readable at {at} expected a count and as many whole numbers; "
             "it is cut off or damaged: export it again"
         ) from error
+    if any(abs(corner) >= LARGEST_NUMBER for corner in own):
+        raise MeshError(
+            f"face {index} of the OFF file (line {line[place]}) refers to vertex {str(max(own, key=abs))[:20]}, expected "
+            "a number of a vertex; it is damaged: export it again"
+        )
     if number < 0 or len(own) < number:
         raise MeshError(
             f"face {index} of the OFF file (line {line[place]}) has {number} corners, {len(own)} follow; it is cut "
