@@ -23,6 +23,7 @@ from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
 from .bake.repack.commands import pack
 from .bake.report.commands import report
+from .runtime.batch.commands import batch
 from .runtime.commands import evaluate, query, sample
 from .runtime.console import Console, Manners, complain
 from .runtime.deadline import Deadline, interrupts_ask
@@ -52,7 +53,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for command in (query, bake, pack, evaluate, report, sample):
+for command in (batch, query, bake, pack, evaluate, report, sample):
     app.command(command)
 
 
@@ -139,6 +140,12 @@ def _one_of_several(run: Run, console: Console) -> int:
         return _perform(run, console)
     except FlexparaError as error:
         return complain(f"{run.mesh.name}: {error}", error.exit_code)
+
+
+def unwrap_one(run: Run) -> None:
+    """One unwrap of a batch, without a word: files and their report are what there is to know."""
+    options = replace(run.options, padding=_padding(run.options, run.outputs))
+    _perform(replace(run, options=options), Console(quiet=True), summary=False)
 
 
 def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outputs, console: Console) -> int:

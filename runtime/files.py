@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 PRODUCER = "flexpara"
 STAGING = ".flexpara-"
+"""Beginning of the names of hidden folders."""
+JOURNAL = ".flexpara.json"
+"""Ending of the name of a hidden file that lists what is being moved."""
 
 
 class OutputFolder:
@@ -164,8 +167,13 @@ class OutputFolder:
         with _disk_full_is_said(self.folder):
             for name in names:
                 _reach_disk(staging / name)
+        journal = self.folder / f".{self.stem}{JOURNAL}"
+        # killed between two moves, the next run knows by it whose files these are
+        with _disk_full_is_said(self.folder):
+            replace_file(journal, json.dumps({"producer": PRODUCER, "files": names}).encode())
         for name in names:
             (staging / name).replace(self.folder / name)
+        journal.unlink()
         self._made = ()
         self._discard()
         return tuple(self.folder / name for name in names)
@@ -222,6 +230,13 @@ def _reach_disk(path: Path) -> None:
         os.fsync(file.fileno())
 
 
+def sweep(folder: Path) -> None:
+    """Remove the hidden folders that killed runs left in an output folder, which nothing writes to now."""
+    for path in folder.glob(f"{STAGING}*") if folder.is_dir() else ():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+
+
 def write_whole(path: Path, writer: Callable[[Path], object], *, force: bool = False) -> Path:
     """Write one file that has no report: whole or not at all, and over an existing one only with force.
 
@@ -261,10 +276,14 @@ def _plain(name: str) -> str:
 
 
 def _owned(folder: Path, stem: str) -> frozenset[str]:
-    """Names listed in reports of this stem, `<stem>.<something>.json`; a file of anyone else lists nothing."""
+    """Names listed in reports of this stem, `<stem>.<something>.json`, and in the journal of a run that was killed.
+
+    A file of anyone else lists nothing.
+    """
     names: set[str] = set()
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if path.name.startswith(f"{stem}.") and path.name.endswith(".json") and path.is_file():
+        of_stem = path.name.startswith(f"{stem}.") and path.name.endswith(".json")
+        if (of_stem or path.name == f".{stem}{JOURNAL}") and path.is_file():
             names |= _listed(path)
     return frozenset(names)
 

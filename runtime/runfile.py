@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,17 +54,9 @@ class Run:
         """Write `run.json`, whole, if checkpoints are kept.  Raises: InputError for a folder not to be written to."""
         if self.every is None:
             return
-        facts = {
-            "format": FORMAT,
-            "mesh": str(self.mesh),
-            "output": str(self.output),
-            "options": asdict(self.options),
-            "outputs": asdict(self.outputs),
-            "every": self.every,
-        }
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            replace_file(self.folder / NAME, (json.dumps(facts, indent=2) + "\n").encode())
+            replace_file(self.folder / NAME, (json.dumps(facts_of(self), indent=2) + "\n").encode())
         except OSError as error:
             raise InputError(f"can't write to {self.folder} ({error.strerror}); choose another -o") from error
 
@@ -72,6 +64,30 @@ class Run:
         """Remove the folder of checkpoints."""
         if self.every is not None and (self.folder / NAME).is_file():
             shutil.rmtree(self.folder)
+
+
+def facts_of(run: Run) -> dict[str, Any]:
+    """A run as JSON holds it."""
+    return {
+        "format": FORMAT,
+        "mesh": str(run.mesh),
+        "output": str(run.output),
+        "options": asdict(run.options),
+        "outputs": asdict(run.outputs),
+        "every": run.every,
+    }
+
+
+def run_of(facts: dict[str, Any]) -> Run:
+    """The run of `facts_of`.  Raises: InputError, ValueError, TypeError, KeyError, AttributeError for what is none."""
+    if facts["format"] != FORMAT:
+        raise InputError(f"format is {str(facts['format'])[:60]!r}, expected {FORMAT!r}; start the run anew")
+    parts: list[dict[str, Any]] = [
+        {name: tuple(value) if isinstance(value, list) else value for name, value in facts[part].items()}
+        for part in ("options", "outputs")
+    ]
+    every = None if facts["every"] is None else int(facts["every"])
+    return Run(Path(facts["mesh"]), Path(facts["output"]), Options(**parts[0]), Outputs(**parts[1]), every)
 
 
 def find_run(output: Path) -> Run:
@@ -95,19 +111,9 @@ def read_run(path: Path, output: Path) -> Run:
     if path.stat().st_size > LARGEST:
         raise InputError(f"{path} has {path.stat().st_size} bytes, expected at most {LARGEST}; start the run anew")
     try:
-        facts: dict[str, Any] = json.loads(path.read_bytes())
-        if facts["format"] != FORMAT:
-            raise InputError(
-                f"{path}: format is {str(facts['format'])[:60]!r}, expected {FORMAT!r}; start the run anew"
-            )
-        parts: list[dict[str, Any]] = [
-            {name: tuple(value) if isinstance(value, list) else value for name, value in facts[part].items()}
-            for part in ("options", "outputs")
-        ]
-        every = None if facts["every"] is None else int(facts["every"])
-        run = Run(Path(facts["mesh"]), output.absolute(), Options(**parts[0]), Outputs(**parts[1]), every)
-    except InputError:
-        raise
+        run = replace(run_of(json.loads(path.read_bytes())), output=output.absolute())
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is damaged ({error}), expected what flexpara wrote; start the run anew") from error
     if f"{run.mesh.stem}{FOLDER}" != path.parent.name:

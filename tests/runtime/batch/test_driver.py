@@ -1,0 +1,182 @@
+"""Jobs and workers: results, limits, deaths and interrupts, with work that takes no time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from flexpara.runtime.batch.driver import Driver, Limits, shares_of_cores
+from flexpara.runtime.batch.jobs import Job, find_jobs
+from flexpara.runtime.batch.lock import locked
+from flexpara.runtime.batch.manifest import Entry, read_entries
+from flexpara.runtime.errors import InputError
+from flexpara.runtime.options.unwrap import Options, Outputs
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are watched by way of /proc")
+
+NO_LIMITS = Limits()
+WORKS = """
+import json, os, signal, time
+from flexpara.runtime.errors import InputError
+
+def write(run):
+    run.output.mkdir(parents=True, exist_ok=True)
+    report = {"metrics": {"charts": 2}, "network": {}, "source": {"faces": 7}, "seconds": {"charts": 0.5}, "train": {}}
+    (run.output / f"{run.mesh.stem}.report.json").write_text(json.dumps(report))
+
+def by_name(run):
+    name = run.mesh.stem
+    if name.startswith("die"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name.startswith("once") and not (run.output / "tried").exists():
+        run.output.mkdir(parents=True)
+        (run.output / "tried").write_text("")
+        (run.output / ".flexpara-left").mkdir()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name.startswith("slow"):
+        time.sleep(60)
+    if name.startswith("large"):
+        keep = b"x" * 400_000_000
+        time.sleep(60)
+    if name.startswith("refused"):
+        raise InputError("value, expected another; correct it")
+    if name.startswith("defect"):
+        raise ValueError("oh")
+    print("noise on stdout")
+    write(run)
+"""
+
+
+@pytest.fixture
+def works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "works.py").write_text(WORKS, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    return "works:by_name"
+
+
+def jobs_in(folder: Path, *names: str) -> list[Job]:
+    meshes = folder / "assets"
+    meshes.mkdir()
+    for name in names:
+        (meshes / f"{name}.obj").write_text("", encoding="utf-8")
+    return find_jobs([meshes], folder / "out", Options(), Outputs())
+
+
+def worked(jobs: list[Job], folder: Path, works: str, limits: Limits = NO_LIMITS) -> dict[str, Entry]:
+    (folder / "out").mkdir(exist_ok=True)
+    manifest = folder / "out" / "manifest.jsonl"
+    assert Driver(manifest, "1", works, limits, lambda _entry: None).run(jobs, [[0], [0]])
+    return read_entries(manifest)
+
+
+def test_each_job_ends_with_its_entry(tmp_path: Path, works: str) -> None:
+    found = worked(jobs_in(tmp_path, "a", "b", "c", "refused", "defect"), tmp_path, works)
+    assert {name: entry.status for name, entry in found.items()} == {
+        "a.obj": "done",
+        "b.obj": "done",
+        "c.obj": "done",
+        "refused.obj": "failed",
+        "defect.obj": "failed",
+    }
+    assert found["a.obj"].metrics == {**found["b.obj"].metrics, "charts": 2, "faces": 7}
+    assert list(found["a.obj"].files) == ["a.report.json"]
+    assert found["refused.obj"].error == "value, expected another; correct it"
+    assert found["defect.obj"].error.startswith("ValueError: oh (works.py:")
+
+
+def test_a_worker_that_dies_is_replaced_and_its_job_tried_again(tmp_path: Path, works: str) -> None:
+    found = worked(jobs_in(tmp_path, "a", "die", "once", "z"), tmp_path, works)
+    assert [entry.status for _, entry in sorted(found.items())] == ["done", "failed", "done", "done"]
+    assert "died 2 times (SIGKILL)" in found["die.obj"].error
+    assert found["die.obj"].again
+    assert not list((tmp_path / "out").rglob(".flexpara-*"))
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "said"),
+    [
+        ("slow", Limits(seconds=1.5), "took more than 1.5 s"),
+        ("large", Limits(memory=300_000_000), "took more than 0.3 GB of memory"),
+    ],
+)
+def test_what_takes_too_much_is_given_up_and_the_rest_goes_on(
+    name: str, limits: Limits, said: str, tmp_path: Path, works: str
+) -> None:
+    found = worked(jobs_in(tmp_path, name, "z"), tmp_path, works, limits)
+    assert said in found[f"{name}.obj"].error
+    assert found["z.obj"].status == "done"
+
+
+@pytest.mark.parametrize(("interrupts", "most"), [(1, 4.0), (2, 1.5)])
+def test_interrupts_give_back_what_is_running(interrupts: int, most: float, tmp_path: Path, works: str) -> None:
+    jobs = jobs_in(tmp_path, "a", "slow")
+    (tmp_path / "out").mkdir()
+    manifest, at = tmp_path / "out" / "manifest.jsonl", []
+
+    def interrupt() -> None:
+        while not read_entries(manifest):
+            time.sleep(0.05)
+        for _ in range(interrupts):
+            at.append(time.monotonic())
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.3)
+
+    before = signal.getsignal(signal.SIGINT)
+    threading.Thread(target=interrupt, daemon=True).start()
+    whole = Driver(manifest, "1", works, Limits(), lambda _entry: None).run(jobs, [[0], [0]])
+    assert not whole
+    assert time.monotonic() - at[0] < most
+    assert list(read_entries(manifest)) == ["a.obj"]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_workers_end_with_their_driver(works: str) -> None:
+    script = (
+        "import sys, time; from flexpara.runtime.batch.pool import Worker; "
+        f"worker = Worker({works!r}, [0]); print(worker.process.pid, flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as driver:
+        assert driver.stdout is not None
+        number = int(driver.stdout.readline())
+        driver.kill()
+    limit = time.monotonic() + 10.0
+    while alive(number) and time.monotonic() < limit:
+        time.sleep(0.05)
+    assert not alive(number)
+
+
+def alive(number: int) -> bool:
+    """Whether a process runs; one that ended and is not yet waited for does not."""
+    try:
+        state = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
+
+
+def test_a_folder_has_one_batch_at_a_time(tmp_path: Path) -> None:
+    path = tmp_path / "out" / ".batch.lock"
+    with locked(path), pytest.raises(InputError, match=rf"process {os.getpid()} works on"), locked(path):
+        pass
+    with locked(path):
+        pass
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="choose another -o"), locked(tmp_path / "file" / ".batch.lock"):
+        pass
+
+
+def test_cores_are_shared_out() -> None:
+    cores = sorted(os.sched_getaffinity(0))
+    assert shares_of_cores("auto") == [[core] for core in cores]
+    assert shares_of_cores("1") == [cores]
+    assert len(shares_of_cores(str(3 * len(cores)))) == 3 * len(cores)

@@ -1,0 +1,102 @@
+"""The assets of a batch: found in folders, listed in files, shared between machines."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from flexpara.runtime.batch.jobs import Job, find_jobs, shard
+from flexpara.runtime.errors import InputError, MissingFileError
+from flexpara.runtime.options.unwrap import Options, Outputs
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def mesh(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(TRIANGLE, encoding="utf-8")
+    return path
+
+
+def jobs_of(*assets: Path) -> list[Job]:
+    return find_jobs(assets, Path("/out"), Options(), Outputs())
+
+
+def test_folders_are_searched_to_the_bottom_and_each_asset_has_a_folder_of_its_own(tmp_path: Path) -> None:
+    for name in ("b.obj", "deep/a.obj", "deep/notes.txt"):
+        mesh(tmp_path / name)
+    found = jobs_of(tmp_path)
+    assert [job.name for job in found] == ["b.obj", "deep/a.obj"]
+    assert [job.run.output for job in found] == [Path("/out/b"), Path("/out/deep/a")]
+
+
+def test_two_files_of_one_stem_keep_their_endings(tmp_path: Path) -> None:
+    for name in ("a.obj", "a.off"):
+        mesh(tmp_path / name)
+    assert [job.run.output for job in jobs_of(tmp_path)] == [Path("/out/a.obj"), Path("/out/a.off")]
+
+
+def test_a_list_gives_options_to_single_files(tmp_path: Path) -> None:
+    lines = [{"file": "x/a.obj", "options": {"charts": 3, "maps": "ao"}}, {"file": "b.obj"}]
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text("\n".join(json.dumps(line) for line in lines), encoding="utf-8")
+    second, first = jobs_of(listed)
+    assert (first.name, first.run.mesh) == ("x/a.obj", tmp_path / "x/a.obj")
+    assert (first.run.options.charts, first.run.outputs.maps) == (3, ("ao",))
+    assert (second.run.options, second.run.outputs) == (Options(), Outputs())
+
+
+def test_a_list_cannot_name_an_output_outside(tmp_path: Path) -> None:
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text('{"file": "../../etc/a.obj"}\n{"file": "/etc/b.obj"}', encoding="utf-8")
+    assert {job.run.output for job in jobs_of(listed)} == {Path("/out/a"), Path("/out/b")}
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("{", "no JSON"),
+        ("[]", "names no file"),
+        ('{"file": 3}', "names no file"),
+        ('{"file": "a.obj", "options": 3}', "no object"),
+        ('{"file": "a.obj", "options": {"chart": 3}}', "pass charts"),
+        ('{"file": "a.obj", "options": {"charts": 0}}', "expected 1 or more"),
+        ("[" * 50000, "no JSON"),
+    ],
+)
+def test_a_damaged_list_is_refused(line: str, said: str, tmp_path: Path) -> None:
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text(line, encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        jobs_of(listed)
+
+
+def test_what_is_not_there_or_empty_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match="is not there"):
+        jobs_of(tmp_path / "absent")
+    with pytest.raises(MissingFileError, match="holds no mesh"):
+        jobs_of(tmp_path)
+
+
+def test_shards_share_all_assets(tmp_path: Path) -> None:
+    for number in range(7):
+        mesh(tmp_path / f"{number}.obj")
+    jobs = jobs_of(tmp_path)
+    parts = [[job.name for job in shard(jobs, (number, 3))] for number in (1, 2, 3)]
+    assert parts[0] == ["0.obj", "3.obj", "6.obj"]
+    assert sorted(name for part in parts for name in part) == [job.name for job in jobs]
+
+
+def test_options_and_content_have_fingerprints(tmp_path: Path) -> None:
+    path = mesh(tmp_path / "a.obj")
+    (one,) = jobs_of(path)
+    (other,) = find_jobs([path], Path("/out"), Options(charts=3), Outputs())
+    assert one.asked("1") == jobs_of(path)[0].asked("1")
+    assert len({one.asked("1"), one.asked("2"), other.asked("1")}) == 3
+    before = one.content()
+    path.write_text(TRIANGLE + "\n", encoding="utf-8")
+    assert one.content() not in (before, "")
+    path.unlink()
+    assert one.content() == ""
