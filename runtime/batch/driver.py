@@ -110,7 +110,7 @@ class Driver:
                     "error": f"{cause}, expected it to end; run the batch again",
                     "again": True,
                 }
-        elif job is None or "ready" in facts:
+        if job is None:
             return
         worker.job = None
         self.note(job, facts)

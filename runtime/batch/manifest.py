@@ -106,17 +106,12 @@ def _is_there(job: Job, entry: Entry) -> bool:
 
 
 def left_to_do(jobs: Iterable[Job], entries: dict[str, Entry], version: str, *, retry: bool) -> list[Job]:
-    """Jobs that have no entry, that failed (by a death, or if ``retry``), whose file or options changed, or whose files are gone."""
+    """Jobs that have no entry, that failed (by a death, or if ``retry``), that changed, or whose files are gone."""
     left = []
     for job in jobs:
         entry = entries.get(job.name)
         same = entry is not None and entry.asked == job.asked(version) and entry.content == job.content()
-        if (
-            entry is None
-            or not same
-            or entry.again
-            or (entry.status == "failed" and retry)
-            or not _is_there(job, entry)
-        ):
+        failed = entry is not None and (entry.again or (entry.status == "failed" and retry))
+        if entry is None or not same or failed or not _is_there(job, entry):
             left.append(job)
     return left

@@ -57,7 +57,10 @@ class Worker:
             self.process.stdin.flush()
 
     def answer(self) -> dict[str, Any] | None:
-        """The next line it sends; None where it ended instead."""
+        """Its line on the job it has; None where it ended instead.
+
+        One line a job: a second would wait in the buffer, where ``wait_for`` does not see it.
+        """
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         return json.loads(line) if line.endswith(b"\n") else None

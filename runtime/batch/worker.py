@@ -45,8 +45,6 @@ def main(parent: str, work: str, cores: str) -> None:
     threading.Thread(target=_end_with, args=(int(parent),), daemon=True).start()
     module, _, name = work.partition(":")
     function: Callable[[Run], object] = getattr(import_module(module), name)
-    answers.write(json.dumps({"ready": True}) + "\n")
-    answers.flush()
     for line in sys.stdin:
         answers.write(json.dumps(answer(function, run_of(json.loads(line))), allow_nan=False) + "\n")
         answers.flush()
