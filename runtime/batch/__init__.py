@@ -1,4 +1,4 @@
 """A folder of assets, each unwrapped once: what is to be done, by whom, and what came of it.
 
-Public face: `jobs.find_jobs`, `driver.run_batch`, `status.status_of`.
+Public face: `jobs.find_jobs`, `driver.Driver`, `status.status_of`.
 """
