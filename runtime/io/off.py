@@ -181,9 +181,10 @@ def _polygon(words: _Words, place: int, index: int) -> list[int]:
             "it is cut off or damaged: export it again"
         ) from error
     if any(abs(corner) >= LARGEST_NUMBER for corner in own):
+        found = str(max(own, key=abs))[:20]
         raise MeshError(
-            f"face {index} of the OFF file (line {line[place]}) refers to vertex {str(max(own, key=abs))[:20]}, expected "
-            "a number of a vertex; it is damaged: export it again"
+            f"face {index} of the OFF file (line {line[place]}) refers to vertex {found}, expected one that exists; "
+            "it is damaged: export it again"
         )
     if number < 0 or len(own) < number:
         raise MeshError(

@@ -107,5 +107,5 @@ def test_damage_is_named_by_its_line(text: str, message: str) -> None:
 
 def test_a_vertex_beyond_all_integers_is_refused_by_its_line() -> None:
     text = f"OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 {10**30}\n4 0 1 2 1\n"
-    with pytest.raises(MeshError, match=r"face 0 of the OFF file \(line 6\) refers to vertex 1000"):
+    with pytest.raises(InputError, match=r"face 0 of the OFF file \(line 6\) refers to vertex 1000"):
         read_off(text.encode())
