@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
 from ..finish.pieces import Overlapping, Piece
-from ..search.labels import border_lengths, connected_pieces, dual_graph, smooth_labels
+from ..search.labels import borders_of, connected_pieces, contracted, dual_graph, smooth_labels
 from ..search.search import Search
 from ..workers import parallel_map
 from .layout import carried_uv, features
@@ -140,18 +140,22 @@ def fragments_joined(
     would make a closed limb of the other half, which no disk can carry.
     """
     least_area = islet * float(areas.sum())
+    part = connected_pieces(label, graph)
+    between = contracted(part, graph)  # thousands of crumbs are joined one by one: not on the faces
+    area, of_part = np.bincount(part, areas), np.zeros(int(part.max()) + 1, dtype=np.int64)
+    of_part[part] = label
     while True:
-        piece = connected_pieces(label, graph)
+        piece = connected_pieces(of_part, between)
         count = int(piece.max()) + 1
-        size = np.bincount(piece, areas, minlength=count)
+        size = np.bincount(piece, area, minlength=count)
         of = np.zeros(count, dtype=np.int64)
-        of[piece] = label
+        of[piece] = of_part
         largest = np.zeros(count, dtype=bool)
         order = np.lexsort((np.arange(count), -size, of))
         largest[order[np.unique(of[order], return_index=True)[1]]] = True
         fragments = np.flatnonzero(~largest & (size < least_area))
         if len(fragments) == 0:
-            return piece
-        border = border_lengths(piece, count, graph)
+            return piece[part]
         least = fragments[size[fragments].argmin()]
-        label = np.where(piece == least, of[border[least].argmax()], label)
+        border = borders_of(least, piece, count, between)
+        of_part = np.where(piece == least, of[border.argmax()], of_part)

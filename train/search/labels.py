@@ -153,6 +153,23 @@ def islets_joined(
         piece = np.unique(piece, return_inverse=True)[1].astype(np.int64)
 
 
+def contracted(piece: NDArray[np.int64], graph: DualGraph) -> DualGraph:
+    """The graph of pieces (f,): what joins each two of them, added up."""
+    ends = np.sort(piece[graph.pairs], axis=1)
+    apart = ends[:, 0] != ends[:, 1]
+    pairs, which = np.unique(ends[apart], axis=0, return_inverse=True)
+    which = which.reshape(-1)
+    length, cost = (np.bincount(which, of[apart], minlength=len(pairs)) for of in (graph.length, graph.cost))
+    return DualGraph(pairs, length, cost)
+
+
+def borders_of(one: int, piece: NDArray[np.int64], count: int, graph: DualGraph) -> NDArray[np.float64]:
+    """(count,) length of the border between one piece and each of the others."""
+    i, j = piece[graph.pairs].T
+    mine = (i == one) != (j == one)
+    return np.bincount(np.where(i == one, j, i)[mine], graph.length[mine], minlength=count)
+
+
 def border_lengths(piece: NDArray[np.int64], count: int, graph: DualGraph) -> NDArray[np.float64]:
     """(count, count) length of the border between each two pieces; zero diagonal."""
     i, j = piece[graph.pairs[:, 0]], piece[graph.pairs[:, 1]]

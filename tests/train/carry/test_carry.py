@@ -27,7 +27,7 @@ from flexpara.train.config import CarryConfig, FinishConfig
 from flexpara.train.finish.contact import excess_energy
 from flexpara.train.finish.flatten import flatten
 from flexpara.train.finish.slits import Flat
-from flexpara.train.search.labels import DualGraph, connected_pieces, dual_graph
+from flexpara.train.search.labels import DualGraph, borders_of, connected_pieces, dual_graph
 from flexpara.train.search.search import Search
 
 CONFIG = FinishConfig()
@@ -123,6 +123,26 @@ def test_a_large_fragment_stays_a_piece_of_its_own() -> None:
     joined = fragments_joined(label, sphere.face_areas(), graph_of(sphere), 0.01)
     assert int(joined.max()) == 2
     assert len(np.unique(joined[height > 0.8])) == 1
+
+
+def test_crumbs_are_joined_as_one_by_one_on_the_faces() -> None:
+    """A slow twin that looks for pieces among the faces each time."""
+    sphere = sample("sphere", 24)
+    graph, areas = graph_of(sphere), sphere.face_areas()
+    label = np.random.default_rng(0).integers(3, size=len(areas))
+    slow, least = label, 0.01 * float(areas.sum())
+    while True:
+        piece = connected_pieces(slow, graph)
+        count = int(piece.max()) + 1
+        size = np.bincount(piece, areas)
+        of = np.array([slow[piece == one][0] for one in range(count)])
+        largest = {max(np.flatnonzero(of == one), key=lambda n: (size[n], -n)) for one in np.unique(of)}
+        small = [one for one in range(count) if one not in largest and size[one] < least]
+        if not small:
+            break
+        crumb = min(small, key=lambda one: size[one])
+        slow = np.where(piece == crumb, of[borders_of(crumb, piece, count, graph).argmax()], slow)
+    np.testing.assert_array_equal(fragments_joined(label, areas, graph, 0.01), piece)
 
 
 def test_labels_without_fragments_are_only_renumbered() -> None:

@@ -1,0 +1,138 @@
+"""`flexpara.xatlas` beside xatlas, the same calls: `python -m benchmarks.dropin [MESH…] [--level-sets FACES…]`.
+
+Each mesh goes through `add_mesh`, `generate` and `get_mesh` with default options, in a process for each tool.  A level
+set is what callers in 3D generation hand over: marching cubes over a labyrinth with noise, its vertices rounded as such
+pipelines do, so that edges are not manifold and crumbs float about.  Seconds are those of the calls; CPU seconds are
+those of the process.  Seam is its length over √area; symdir the mean symmetric Dirichlet energy, 1 is isometric.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from argparse import ArgumentParser
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from benchmarks.corpus.processes import run
+from flexpara.runtime.geometry.metrics import measure
+from flexpara.runtime.io.clean.clean import clean
+from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.io.rawmesh import RawMesh
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+TOOLS = ("xatlas", "flexpara.xatlas")
+LIMIT = 1200.0
+"""Seconds after which a run is ended."""
+WAVES = 1.5
+"""Periods of the labyrinth along a side of its box."""
+NOISE = 0.12
+"""Standard deviation of the noise in a field that reaches from −1.5 to 1.5, before it is smoothed."""
+ROUNDED = 4.0
+"""Steps of a cell that vertices are rounded to."""
+COARSE = 64
+"""Cells along a side from which those of a level set with the faces asked for are foretold."""
+
+
+class Mesh(NamedTuple):
+    """What is handed over: a name, vertices (v, 3), faces (f, 3)."""
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def level_set(faces: int) -> Mesh:
+    """Marching cubes of about so many faces, which grow with the square of the cells along a side."""
+    cells = round(COARSE * (faces / len(marched(COARSE).faces)) ** 0.5)
+    return marched(round(cells * (faces / len(marched(cells).faces)) ** 0.5))
+
+
+def marched(cells: int) -> Mesh:
+    """A gyroid with noise in a box of `cells` each way."""
+    measure_of, filters = import_module("skimage.measure"), import_module("scipy.ndimage")
+    x, y, z = np.meshgrid(*[np.linspace(0.0, 2.0 * np.pi * WAVES, cells)] * 3, indexing="ij")
+    noise = np.random.default_rng(0).normal(scale=NOISE, size=x.shape)
+    field = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+    field = np.pad(field + filters.gaussian_filter(noise, 0.5), 1, constant_values=2.0)
+    vertices, faces, _, _ = measure_of.marching_cubes(field, 0.0, method="lorensen")
+    rounded, weld = np.unique(np.round(vertices * ROUNDED), axis=0, return_inverse=True)
+    faces = weld.reshape(-1)[faces]
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return Mesh("level set", rounded / (ROUNDED * cells), faces[whole].astype(np.int64))
+
+
+def unwrapped(tool: str, given: str, answer: str, budget: float) -> None:
+    """One run, in this process: mapping, faces and uv in texels, and the seconds of the calls, into a file."""
+    xatlas = import_module(tool)
+    if tool != "xatlas":
+        xatlas.settings.time_budget = budget
+    with np.load(given) as mesh:
+        vertices, faces = mesh["vertices"].astype(np.float32), mesh["faces"].astype(np.uint32)
+    start = time.perf_counter()
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(vertices, faces)
+    atlas.generate()
+    mapping, corner, uv = atlas.get_mesh(0)
+    seconds = time.perf_counter() - start
+    np.savez(answer, mapping=mapping, faces=corner, uv=uv * (atlas.width, atlas.height), seconds=seconds)
+
+
+def row(tool: str, mesh: Mesh, budget: float, folder: Path) -> str:
+    """A line of the table.  What has no area is not measured, whoever left it out."""
+    given, answer = folder / "mesh.npz", folder / f"{tool}.npz"
+    np.savez(given, vertices=mesh.vertices, faces=mesh.faces)
+    words = ["--run", tool, "--given", str(given), "--answer", str(answer), "--budget", str(budget)]
+    ended = run([sys.executable, "-m", "benchmarks.dropin", *words], LIMIT)
+    start = f"| {mesh.name} | {len(mesh.faces):,} | {tool} |"
+    if ended.code != 0:
+        return f"{start} ended with {ended.code}: {ended.said} |"
+    with np.load(answer) as found:
+        uv = found["uv"].astype(np.float64)[found["faces"]]
+        seconds = float(found["seconds"])
+    asset = clean(RawMesh(mesh.vertices, mesh.faces, face_material=np.arange(len(mesh.faces))))
+    assert asset.face_material is not None
+    turned = asset.faces[:, 1] != mesh.faces[asset.face_material, 1]
+    uv = np.where(turned[:, None, None], uv[asset.face_material][:, [0, 2, 1]], uv[asset.face_material])
+    found = measure(asset.surface, uv).to_dict()
+    measures = f"{found['charts']:,} | {found['seam_length']:.2f} | {found['symmetric_dirichlet_mean']:.4f}"
+    return f"{start} {seconds:.1f} ({ended.cpu_seconds:.0f}) | {measures} | {found['flipped_faces']} |"
+
+
+def given_meshes(paths: Sequence[Path], level_sets: Sequence[int]) -> Iterator[Mesh]:
+    """Files, then level sets of so many faces."""
+    for path in paths:
+        surface = load_asset(path).surface
+        yield Mesh(path.stem, surface.vertices, surface.faces)
+    yield from map(level_set, level_sets)
+
+
+def main() -> None:
+    """Print the table, a line as soon as it is known; or, in a process of its own, make one run."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("meshes", nargs="*", type=Path)
+    parser.add_argument("--level-sets", nargs="*", type=int, default=[])
+    parser.add_argument("--budget", type=float, default=60.0, help="seconds for flexpara.xatlas.settings.time_budget")
+    for name in ("--run", "--given", "--answer"):
+        parser.add_argument(name)
+    asked = parser.parse_args()
+    if asked.run:
+        unwrapped(asked.run, asked.given, asked.answer, asked.budget)
+        return
+    print("| mesh | faces | tool | seconds (CPU) | charts | seam | symdir | flips |\n|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for mesh in given_meshes(asked.meshes, asked.level_sets):
+            for tool in TOOLS:
+                print(row(tool, mesh, asked.budget, Path(folder)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
