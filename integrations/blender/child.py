@@ -14,8 +14,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 PROGRESS = re.compile(r"flexpara: progress: (.+) (\d+)/(\d+)$")
+SPANS = {
+    "parts": (0.0, 0.05),
+    "charts": (0.05, 0.75),
+    "exact check": (0.75, 0.8),
+    "fit": (0.8, 0.85),
+    "pack": (0.85, 0.95),
+    "measure": (0.95, 0.97),
+    "export": (0.97, 0.98),
+    "write": (0.98, 1.0),
+}
+"""Where the stages of unwrap begin and end on the bar, as they take time on a mesh of some 10,000 faces."""
 WINDOWS = sys.platform == "win32"
-PACKAGE = "flexpara[unwrap,bake]"
+EXTRAS = "[unwrap,bake]"
+"""Of flexpara: charts, textures, files; no torch."""
 
 
 class FlexparaError(Exception):
@@ -23,10 +35,16 @@ class FlexparaError(Exception):
 
 
 class Stage(NamedTuple):
-    """What is being done, and which share of it is done."""
+    """What is being done, and which share of the whole is done; of the stage, where it is not one of unwrap's."""
 
     name: str
     share: float
+
+
+def stage_of(name: str, done: int, of: int) -> Stage:
+    """A stage of which so many steps are done."""
+    begin, end = SPANS.get(name, (0.0, 1.0))
+    return Stage(name, begin + (end - begin) * done / max(of, 1))
 
 
 def find(preferred: str = "") -> str:
@@ -41,10 +59,21 @@ def find(preferred: str = "") -> str:
     return found
 
 
-def install_commands(folder: Path, python: str) -> list[list[str]]:
-    """What makes an environment with flexpara in a folder: shown before it is run."""
+def install_commands(folder: Path, python: str, source: str) -> list[list[str]]:
+    """What makes an environment with flexpara in a folder: shown before it is run.
+
+    Args:
+        folder: where it will be.
+        python: the program that makes it.
+        source: what pip takes: a checkout or wheel on this machine, or an address.
+
+    Raises: FlexparaError where no source is named: flexpara is not on the registry yet.
+    """
+    if not source:
+        raise FlexparaError("no source is named: choose a checkout or a wheel of flexpara under Install from")
     inside = folder / ("Scripts" if WINDOWS else "bin")
-    return [[python, "-m", "venv", str(folder)], [str(inside / "python"), "-m", "pip", "install", PACKAGE]]
+    package = f"flexpara{EXTRAS} @ {source}" if "://" in source else f"{source.rstrip('/')}{EXTRAS}"
+    return [[python, "-m", "venv", str(folder)], [str(inside / "python"), "-m", "pip", "install", package]]
 
 
 def installed(folder: Path) -> str:
@@ -111,7 +140,7 @@ class Run:
             for line in stream:
                 found = PROGRESS.match(line.strip())
                 if found:
-                    self.stage = Stage(found[1], int(found[2]) / max(int(found[3]), 1))
+                    self.stage = stage_of(found[1], int(found[2]), int(found[3]))
                 elif line.strip():
                     self.notes.append(line.strip())
 

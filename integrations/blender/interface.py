@@ -27,6 +27,9 @@ class FlexparaPreferences(bpy.types.AddonPreferences):
     program: bpy.props.StringProperty(
         name="Program", subtype="FILE_PATH", description="The flexpara program; empty: the one on PATH"
     )
+    source: bpy.props.StringProperty(
+        name="Install from", subtype="FILE_PATH", description="A checkout or wheel of flexpara, or an address for pip"
+    )
 
     def draw(self, context: Any) -> None:
         """The path, what is found, and the button that installs it."""
@@ -36,7 +39,10 @@ class FlexparaPreferences(bpy.types.AddonPreferences):
             self.layout.label(text=f"Found: {child.find(self.program)}", icon="CHECKMARK")
         except child.FlexparaError as error:
             self.layout.label(text=str(error), icon="ERROR")
-        self.layout.operator(operators.FLEXPARA_OT_install.bl_idname)
+        self.layout.prop(self, "source")
+        row = self.layout.row()
+        row.enabled = bool(self.source)
+        row.operator(operators.FLEXPARA_OT_install.bl_idname)
 
 
 class Sidebar:

@@ -132,6 +132,14 @@ class FLEXPARA_OT_unwrap(InProcess, bpy.types.Operator):
     charts: bpy.props.IntProperty(
         name="Charts", default=8, min=1, max=1000, description="The most charts of each connected part"
     )
+    max_stretch: bpy.props.FloatProperty(
+        name="Max Stretch",
+        default=0.0,
+        min=0.0,
+        max=2.0,
+        precision=3,
+        description="Mean stretch a part may have, 1 is none, for the shortest seams that keep it; 0: both are weighed",
+    )
     time_budget: bpy.props.FloatProperty(
         name="Seconds", default=0.0, min=0.0, description="Time for the search of charts; 0 is no limit"
     )
@@ -145,6 +153,8 @@ class FLEXPARA_OT_unwrap(InProcess, bpy.types.Operator):
 
     def words(self, folder: Path) -> list[str]:
         numbers = {"charts": self.charts, "size": self.size, "padding": self.padding, "seed": self.seed}
+        if self.max_stretch > 0.0:
+            numbers["max-stretch"] = round(self.max_stretch, 4)  # Blender holds float32
         if self.time_budget > 0.0:
             numbers["time-budget"] = self.time_budget
         options = [word for name, value in numbers.items() for word in (f"--{name}", str(value))]
@@ -256,15 +266,20 @@ class FLEXPARA_OT_install(bpy.types.Operator):
 
     def draw(self, context: Any) -> None:
         """What will be run."""
-        del context
         self.layout.label(text="These commands will be run, which takes minutes and about half a gigabyte:")
-        for command in child.install_commands(environment(), sys.executable):
+        for command in self.commands(context):
             self.layout.label(text=shlex.join(command))
+
+    @staticmethod
+    def commands(context: Any) -> list[list[str]]:
+        """What makes the environment, from where the preferences say."""
+        source = context.preferences.addons[__package__].preferences.source
+        return child.install_commands(environment(), sys.executable, source)
 
     def execute(self, context: Any) -> set[str]:
         """Run them, one after the other."""
         try:
-            for command in child.install_commands(environment(), sys.executable):
+            for command in self.commands(context):
                 child.Run(command[0], command[1:]).result()
         except (child.FlexparaError, OSError) as error:
             self.report({"ERROR"}, str(error))

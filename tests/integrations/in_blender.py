@@ -206,6 +206,83 @@ def evaluate_and_bake() -> None:
     assert len([image for image in bpy.data.images if image.packed_file and image.size[0] == 64]) == 2
 
 
+class Window:
+    """Blender's window, as far as a command in the background speaks to it: what it was told."""
+
+    def __init__(self) -> None:
+        self.said: list[object] = []
+        self.shares: list[float] = []
+        self.window_manager = self.workspace = self
+        self.window = None
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is Blender's own."""
+        return getattr(bpy.context, name)
+
+    def event_timer_add(self, _seconds: float, window: object) -> str:
+        """A timer."""
+        return f"timer of {window}"
+
+    def event_timer_remove(self, timer: object) -> None:
+        """No longer wanted."""
+        self.said.append(timer)
+
+    def progress_begin(self, low: float, high: float) -> None:
+        """The bar appears."""
+        self.shares += [low - high]
+
+    def progress_update(self, share: float) -> None:
+        """The bar grows."""
+        self.shares.append(share)
+
+    def progress_end(self) -> None:
+        """The bar is gone."""
+        self.said.append("bar gone")
+
+    def modal_handler_add(self, command: object) -> None:
+        """Events go to the command."""
+        self.said.append(type(command).__name__)
+
+    def status_text_set(self, text: str | None) -> None:
+        """The line at the bottom."""
+        self.said.append(text)
+
+
+class Event:
+    """A timer's tick, or a key."""
+
+    def __init__(self, kind: str, value: str = "NOTHING") -> None:
+        self.type, self.value = kind, value
+
+
+def in_background(operators: Any) -> None:
+    """A bar follows the stages; Esc once asks for the best so far, which is taken over."""
+    empty()
+    bpy.ops.mesh.primitive_torus_add(major_segments=96, minor_segments=48)
+    picked(bpy.context.object)
+    kind = operators.FLEXPARA_OT_unwrap
+    settings = {"charts": 8, "max_stretch": 0.0, "time_budget": 0.0, "size": 256, "padding": 2, "seed": 0}
+    settings |= {"selected_only": False, "mark_seams": True}
+    methods = {name: getattr(kind, name) for name in ("words", "take", "with_uv")}
+    told: list[Any] = []
+    command, window = type("Unwrap", (operators.InProcess,), methods | settings)(), Window()
+    command.report = lambda *words: told.append(words)
+    assert command.invoke(window, Event("MOUSEMOVE")) == {"RUNNING_MODAL"}
+    escaped = False
+    while (state := command.modal(window, Event("TIMER"))) == {"RUNNING_MODAL"}:
+        if not escaped and command.run.stage.name == "charts":
+            command.modal(window, Event("ESC", "PRESS"))
+            escaped = True
+        time.sleep(0.02)
+    assert (state, escaped) == ({"FINISHED"}, True), told
+    assert any("Esc again: stop at once" in str(text) for text in window.said)
+    assert window.said[-3:] == ["timer of None", "bar gone", None]
+    assert len(set(window.shares)) > 2
+    assert window.shares[1:] == sorted(window.shares[1:])
+    assert told[-1][0] == {"INFO"}
+    assert np.ptp(uv_of(bpy.context.object), axis=0).min() > 0.3
+
+
 def failures() -> None:
     """What flexpara complains of is Blender's error, and nothing is changed."""
     empty()
@@ -229,6 +306,7 @@ def main(folder: str, program: str) -> None:
     seconds = suzanne()
     for check in (modifiers, several, selected_faces, evaluate_and_bake):
         check()
+    in_background(extension.operators)
     failures()
     extension.unregister()
     assert not hasattr(bpy.types, "FLEXPARA_OT_unwrap")

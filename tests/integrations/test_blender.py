@@ -123,7 +123,7 @@ def test_a_process_is_watched_asked_and_its_error_is_told() -> None:
     talk = "import sys; print('flexpara: progress: charts 3/4', file=sys.stderr); print('done')"
     run = child.Run(sys.executable, ["-c", talk])
     assert run.result() == "done\n"
-    assert run.stage == ("charts", 0.75)
+    assert run.stage == ("charts", pytest.approx(0.05 + 0.7 * 0.75))
     run = child.Run(sys.executable, ["-c", "import sys; sys.exit('flexpara: error: no mesh, expected one')"])
     with pytest.raises(child.FlexparaError, match=r"^no mesh, expected one$"):
         run.result()
@@ -132,6 +132,12 @@ def test_a_process_is_watched_asked_and_its_error_is_told() -> None:
         time.sleep(0.01)
     run.ask()
     assert run.result() == "best\n"
+
+
+def test_the_bar_grows_from_stage_to_stage_without_a_gap() -> None:
+    assert [begin for begin, _ in child.SPANS.values()] == [0.0, *(end for _, end in child.SPANS.values())][:-1]
+    assert list(child.SPANS.values())[-1][1] == 1.0
+    assert child.stage_of("normal", 1, 4) == ("normal", 0.25)
 
 
 def test_a_program_that_is_not_there_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,9 +149,14 @@ def test_a_program_that_is_not_there_is_told_with_a_remedy(monkeypatch: pytest.M
 
 
 def test_the_commands_that_install_are_known_before_they_run(tmp_path: Path) -> None:
-    first, second = child.install_commands(tmp_path, "python3")
+    first, second = child.install_commands(tmp_path, "python3", "/checkouts/flexpara/")
     assert first == ["python3", "-m", "venv", str(tmp_path)]
-    assert second[-1] == "flexpara[unwrap,bake]"
+    assert second[-3:] == ["pip", "install", "/checkouts/flexpara[unwrap,bake]"]
+    assert child.install_commands(tmp_path, "python3", "git+https://example.org/flexpara")[1][-1] == (
+        "flexpara[unwrap,bake] @ git+https://example.org/flexpara"
+    )
+    with pytest.raises(child.FlexparaError, match="no source is named"):
+        child.install_commands(tmp_path, "python3", "")
 
 
 def test_progress_is_told_in_lines_for_programs(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from ...runtime.deadline import Late, never
 from ...runtime.geometry.distortion import singular_values
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, components, edge_table, within_rings
@@ -43,8 +44,13 @@ if TYPE_CHECKING:
     from ..finish.arap import Solve
 
 
-def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig) -> list[Piece]:
-    """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew."""
+def refined(
+    surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig, late: Late = never
+) -> list[Piece]:
+    """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew.
+
+    Once it is ``late``, a valid layout may be worse than its source, and what has none gets charts of xatlas.
+    """
     label = np.zeros(len(middle.faces), dtype=np.int64)
     for number, piece in enumerate(pieces):
         label[piece.ids] = number
@@ -56,8 +62,15 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
     sources = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
     total = float(areas.sum())
-    found = parallel_map(lambda number: refined_piece(surface, groups[number], sources[number], total, config), order)
+
+    def laid(number: int) -> list[Piece]:
+        return refined_piece(surface, groups[number], sources[number], total, config, late)
+
+    found = parallel_map(laid, order)
     failed = [number for number, of_one in zip(order, found, strict=True) if not of_one]
+    if late():
+        found += parallel_map(lambda number: unwrapped_by_xatlas(surface, groups[number], total), failed)
+        return [piece for of_one in found for piece in of_one]
     anew = State(surface, graph, config) if failed else None
     if anew is not None:
         anew.add_all_valid([(groups[number], sources[number].slits) for number in failed])
@@ -65,9 +78,12 @@ def refined(surface: Surface, middle: Surface, pieces: list[Piece], config: Fini
 
 
 def refined_piece(
-    surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig
+    surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig, late: Late = never
 ) -> list[Piece]:
-    """The faces ids (m,) laid out like their source, and what had to be cut off; empty where no way to is valid."""
+    """The faces ids (m,) laid out like their source, and what had to be cut off; empty where no way to is valid.
+
+    It may be no worse than the source by more than the configured factor, unless it is ``late``.
+    """
     whole = extract(surface, ids)
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []
@@ -76,9 +92,9 @@ def refined_piece(
         found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config)
         if found and (not best or total_cost(found, config) < total_cost(best, config)):
             best = found
-        if best and best[0].energy <= allowed:
+        if best and (best[0].energy <= allowed or late()):
             break
-    if not best or best[0].energy > allowed:
+    if not best or (best[0].energy > allowed and not late()):
         return []
     return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]
 

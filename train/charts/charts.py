@@ -125,7 +125,7 @@ def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
         uv, faces = uv * [-1.0, 1.0], faces[:, [0, 2, 1]]
     vertices = np.zeros((len(uv), 3))
     corner = faces if not part.mirrored else piece.flat.surface.faces[:, [0, 2, 1]]
-    vertices[corner.reshape(-1)] = surface.triangles[ids].reshape(-1, 3)
+    vertices[corner.reshape(-1)] = surface.vertices[surface.faces[ids]].reshape(-1, 3)
     share = part.scale**2 / total
     return replace(
         piece,
@@ -166,7 +166,7 @@ def brought_back(
     """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy."""
     surface, middle, coarse = levels
     if late() and coarse is not surface:
-        return refined(surface, coarse, list(found.pieces.values()), config)
+        return refined(surface, coarse, list(found.pieces.values()), config, late)
     if coarse is not middle:
         found = back_on(middle, coarse, found, charts, config)
     if not late():
@@ -176,7 +176,7 @@ def brought_back(
         found = spent_fine(found, charts, config, late) if config.stretch else found
     found.mend()
     pieces = list(found.pieces.values())
-    return pieces if middle is surface else refined(surface, middle, pieces, config)
+    return pieces if middle is surface else refined(surface, middle, pieces, config, late)
 
 
 def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:

@@ -101,6 +101,30 @@ def test_what_can_not_be_laid_out_is_flattened_anew(monkeypatch: pytest.MonkeyPa
         assert_valid(piece)
 
 
+def test_late_a_layout_worse_than_its_source_is_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    surface = unit("sphere", 64)
+    middle = thinned(surface, MIDDLE)
+    demanding = replace(CONFIG, carry=replace(CONFIG.carry, worse=0.0, slack=0.0))
+    monkeypatch.setattr(fine, "State", None)  # flattening anew would need it
+    found = refined(surface, middle, halves(middle), demanding, lambda: True)
+    assert len(found) == 2
+    for piece in found:
+        assert_valid(piece)
+    with pytest.raises(TypeError):
+        refined(surface, middle, halves(middle), demanding)
+
+
+def test_late_what_can_not_be_laid_out_gets_charts_of_xatlas(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = unit("sphere", 64)
+    middle = thinned(surface, MIDDLE)
+    monkeypatch.setattr(fine, "refined_piece", lambda *_: [])
+    found = refined(surface, middle, halves(middle), CONFIG, lambda: True)
+    assert {piece.method for piece in found} == {"xatlas"}
+    assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(surface.faces)))
+
+
 def test_weights_are_a_partition_and_hold_the_place() -> None:
     surface = unit("cloth", 40)
     middle = unit("cloth", 10)
