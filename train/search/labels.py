@@ -160,14 +160,14 @@ def contracted(piece: NDArray[np.int64], graph: DualGraph) -> DualGraph:
     pairs, which = np.unique(ends[apart], axis=0, return_inverse=True)
     which = which.reshape(-1)
     length, cost = (np.bincount(which, of[apart], minlength=len(pairs)) for of in (graph.length, graph.cost))
-    return DualGraph(pairs, length, cost)
+    return DualGraph(pairs, length.astype(np.float64), cost.astype(np.float64))
 
 
 def borders_of(one: int, piece: NDArray[np.int64], count: int, graph: DualGraph) -> NDArray[np.float64]:
     """(count,) length of the border between one piece and each of the others."""
     i, j = piece[graph.pairs].T
     mine = (i == one) != (j == one)
-    return np.bincount(np.where(i == one, j, i)[mine], graph.length[mine], minlength=count)
+    return np.bincount(np.where(i == one, j, i)[mine], graph.length[mine], minlength=count).astype(np.float64)
 
 
 def border_lengths(piece: NDArray[np.int64], count: int, graph: DualGraph) -> NDArray[np.float64]:
