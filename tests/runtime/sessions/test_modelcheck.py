@@ -6,13 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 
 from flexpara.runtime.errors import BundleError
 from flexpara.runtime.sessions.modelcheck import MOST_NODES, check_model, fields
 from flexpara.runtime.sessions.session import UnwrapSession
-
-onnx = pytest.importorskip("onnx")
 
 
 def model() -> onnx.ModelProto:
