@@ -30,10 +30,11 @@ from .runtime.deadline import Deadline, interrupts_ask
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.inputs import STREAM, from_stdin, meshes_of
-from .runtime.options.unwrap import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs, TrainOptions
+from .runtime.options.unwrap import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs
 from .runtime.options.words import Names
 from .runtime.progress import Clock
 from .runtime.runfile import Run
+from .train.commands import train
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from .runtime.mesh import Asset
 
 INTERRUPTED = 130
-TRAINED = "trained.safetensors"
 CHARTS = Parameter(name="*", group="Charts and atlas")
 FILES = Parameter(name="*", group="Maps and files")
 """Options of a class, under a heading in the help."""
@@ -53,7 +53,7 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-for command in (batch, query, bake, pack, evaluate, report, sample):
+for command in (batch, query, train, bake, pack, evaluate, report, sample):
     app.command(command)
 
 
@@ -221,44 +221,6 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
             page = {"page": facts["source"]["stem"]} if len(result.reports) > 1 else {}
             console.show({**page, **facts["metrics"], **facts["network"]}, ())
     console.show({}, written if summary else ())
-    return 0
-
-
-@app.command
-def train(
-    mesh: Path,
-    *,
-    output: Output,
-    options: Annotated[TrainOptions, CHARTS] = TrainOptions(),
-    console: Manners = Console(),
-) -> int:
-    """Do the first half of unwrap: find charts and networks, and write STEM.trained.safetensors for flexpara export.
-
-    Args:
-        mesh: Any mesh that unwrap takes.
-        output: The folder for STEM.trained.safetensors and STEM.train.json.
-        options: See TrainOptions.
-        console: See Console.
-    """
-    from .runtime.files import OutputFolder
-
-    asset = load(mesh, options.select)
-    console.note_changes(asset)
-    name, report = f"{asset.stem}.{TRAINED}", f"{asset.stem}.train.json"
-    with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
-        folder.check([name, folder.report_name])
-        with requires("unwrap"):
-            from .train.presets import train_asset
-            from .train.saved import to_bytes
-        with console.progress() as progress:
-            trained = train_asset(asset, options, Clock(progress, Deadline(options.time_budget)))
-        folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
-        source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
-        facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}
-        folder.write_report(facts)
-        written = folder.commit()
-    console.notes(trained.report)
-    console.show({}, written)
     return 0
 
 
