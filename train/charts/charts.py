@@ -15,6 +15,7 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
+from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
 from ..carry.straighten import straightened
@@ -31,7 +32,7 @@ from .proof import all_proven, is_valid
 from .shorten import shortened
 from .slivers import steadied
 from .starts import Starts, best_search
-from .tighten import back_on, spent_fine, tightened
+from .tighten import back_on, is_asked, spent_fine, tightened
 
 if TYPE_CHECKING:
     from ...runtime.deadline import Late
@@ -147,9 +148,11 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
+    asked = is_asked(found, charts, config)
     if not starts.late():
-        found = straightened(tightened(found, charts, config, starts.late), config.bands)
-    pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late)
+        found = tightened(found, charts, config, starts.late) if asked else found
+        found = straightened(found, config.bands)
+    pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late, asked=asked)
     if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
         return exact
     energy = sum(piece.energy for piece in pieces)
@@ -161,14 +164,23 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
 
 
 def brought_back(
-    levels: tuple[Surface, Surface, Surface], found: Search, charts: int, config: FinishConfig, late: Late
+    levels: tuple[Surface, Surface, Surface],
+    found: Search,
+    charts: int,
+    config: FinishConfig,
+    late: Late,
+    *,
+    asked: bool,
 ) -> list[Piece]:
-    """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy."""
+    """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy.
+
+    asked: few charts or short seams were, so that what was closed is led back as a network of seams.
+    """
     surface, middle, coarse = levels
     if late() and coarse is not surface:
         return refined(surface, coarse, list(found.pieces.values()), config, late)
     if coarse is not middle:
-        found = back_on(middle, coarse, found, charts, config)
+        found = (back_on if asked else carried_back)(middle, coarse, found, charts, config)
     if not late():
         found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)

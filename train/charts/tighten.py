@@ -16,14 +16,23 @@ if TYPE_CHECKING:
     from ..search.search import Search
 
 
+def is_asked(search: Search, charts: int, config: FinishConfig) -> bool:
+    """Whether fewer charts or shorter seams are asked for than the search found.
+
+    Where neither is, closing lowers the objective by a few percent, and packing by a tenth: charts that branch waste
+    the page.  Far more charts than asked for are left as they are.
+    """
+    above = len(search.pieces) - charts
+    return config.stretch > 0.0 or 0 < above <= config.start.crowded
+
+
 def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
-    """The search with seams closed where that pays, and as far as the bounds on charts and stretch ask for it."""
+    """The search with seams closed as far as the bounds on charts and stretch ask for it, and where that pays."""
     closing, price = config.closing, config.slit.price
-    asked = config.stretch or len(search.pieces) > charts
-    bounds = Bounds(charts, config.stretch or config.most_excess, 0.0 if asked else closing.waste)
+    bounds = Bounds(charts, config.stretch or config.most_excess)
     if config.stretch:
         opened_up(search, bounds.excess, config, late)
-    Closing(search, bounds, closing, late).close(price, closing.tries_asked if asked else closing.tries)
+    Closing(search, bounds, closing, late).close(price, closing.tries)
     if not late():
         search = with_straight_seams(search)
     return spent(search, bounds, config, closing.tries_dearer, late) if config.stretch else search

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from ...runtime.deadline import Late, never
 from ...runtime.geometry.cutgraph import cut_chains
@@ -40,13 +39,11 @@ if TYPE_CHECKING:
 class Bounds:
     """What closing must keep.
 
-    charts: so many are asked for.  excess: mean excess energy of the part at most.  waste: what it costs, in excess
-    energy, where the convex hulls of charts grow by the area of the part: a page holds sprawling charts badly.
+    charts: so many are asked for.  excess: mean excess energy of the part at most.
     """
 
     charts: int
     excess: float
-    waste: float = 0.0
 
 
 class Run(NamedTuple):
@@ -128,9 +125,7 @@ class Closing:
         saved = run.saved - part.rim
         if not np.isfinite(price):
             return -saved
-        wasted = hull_area(part.piece) - sum(hull_area(piece) for piece in sides) if self.bounds.waste else 0.0
-        paid = part.piece.energy - sum(piece.energy for piece in sides)
-        return paid + self.bounds.waste * wasted / self.search.area - price * saved
+        return part.piece.energy - sum(piece.energy for piece in sides) - price * saved
 
     def take(self, run: Run, price: float) -> bool:
         """Replace the pieces beside a run; False, and nothing done, where the bounds are broken."""
@@ -188,11 +183,6 @@ class Closing:
         still = seam.copy()
         still[run.edges] = False
         return valid(search, laid_open(search, ids, still, self.bounds.excess - others), self.config.rounds)
-
-
-def hull_area(piece: Piece) -> float:
-    """Area of the convex hull of a chart, units squared."""
-    return float(ConvexHull(piece.flat.uv).volume)  # in the plane, scipy's volume is the area
 
 
 def path_length(search: Search, edges: NDArray[np.int64]) -> float:

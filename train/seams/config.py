@@ -11,17 +11,12 @@ class ClosingConfig:
 
     charts: int = 8
     """Charts that the search aims at before seams are closed, whatever is asked for."""
-    waste: float = 0.02
-    """Excess energy that a convex hull of charts larger by the area of a part has to save, unless few charts or short
-    seams are asked for."""
     shares: tuple[float, ...] = (1.0, 0.5, 0.25, 0.05)
     """Lengths of the runs tried, as shares of the chain that they are part of."""
     least: int = 1
     """Edges of a run."""
-    tries: int = 32
-    """Runs flattened where the price of seams alone asks for it …"""
-    tries_asked: int = 60
-    """… where there are more charts than asked for …"""
+    tries: int = 60
+    """Runs flattened at the price of seams …"""
     tries_dearer: int = 24
     """… at each higher price, where stretch was asked for …"""
     tries_fine: int = 8
