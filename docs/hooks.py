@@ -16,6 +16,7 @@ SOURCES = (
     "runtime/options/unwrap.py",
     "runtime/options/seams.py",
     "runtime/options/pack.py",
+    "runtime/options/batch.py",
     "runtime/console.py",
     "bake/commands.py",
 )
