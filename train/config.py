@@ -74,8 +74,9 @@ class SliverConfig:
 class ShortenConfig:
     """Charts too long for a page, cut across.  Lengths are shares of √(surface area)."""
 
-    above: float = 2.5
-    """Length above which a chart is cut: laid along the diagonal, it asks for a page of which a third is covered."""
+    above: float = 2.2
+    """Side of the square around a chart, straight or along its diagonal, above which it is cut: about a fifth of
+    such a page is covered, or less."""
     to: float = 1.15
     """Length of the parts it is cut in."""
     shift: float = 0.25

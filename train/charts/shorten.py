@@ -1,6 +1,7 @@
 """Charts too long for a page, cut across: one strip would set the scale of all others.
 
-A chart of length L needs a page of side L/√2 or more, whatever else lies on it; two of half the length need half of it.
+A chart of length L and width W needs a page of side L, or (L + W)/√2 along its diagonal, whatever else lies on it; two
+of half the length need about half of that.
 Cuts run across the long axis of the chart in the plane, where edges of the mesh are shortest.   m faces of a chart.
 """
 
@@ -15,6 +16,7 @@ from ..carry.carry import WALL
 from ..finish.flaps import restricted
 from ..finish.pieces import Piece, measured
 from ..search.labels import connected_pieces, dual_graph, smooth_labels
+from .develop import least_rectangle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,10 +31,10 @@ def shortened(surface: Surface, pieces: list[Piece], page: float, most: int, con
     page: √(area of all that is unwrapped), in the part's units.  most: charts that the part may have.
     """
     found = list(pieces)
-    for piece in sorted(pieces, key=lambda piece: -float(along(piece)[1])):
-        start, length = along(piece)
-        if length <= config.shorten.above * page:
+    for piece in sorted(pieces, key=lambda piece: -page_side(piece)):
+        if page_side(piece) <= config.shorten.above * page:
             break
+        start, length = along(piece)
         room = most - len(found) + 1
         count = min(int(np.ceil(length / (config.shorten.to * page))), room)
         parts = cut_across(piece, start, count, config) if count > 1 else []
@@ -44,12 +46,17 @@ def shortened(surface: Surface, pieces: list[Piece], page: float, most: int, con
     return found
 
 
+def page_side(piece: Piece) -> float:
+    """Side of the least square that holds the box around a chart, straight or along the diagonal."""
+    sides = least_rectangle(piece.flat.uv[piece.flat.surface.faces])
+    return float(min(sides.max(), sides.sum() / np.sqrt(2.0)))
+
+
 def along(piece: Piece) -> tuple[NDArray[np.float64], float]:
     """Where each face lies along the longest direction of a chart, from 0 to 1 (m,), and the length of the whole."""
     corners = piece.flat.uv[piece.flat.surface.faces]
     points = corners.reshape(-1, 2) - corners.reshape(-1, 2).mean(axis=0)
-    axis = np.linalg.svd(points.T @ points)[0][:, 0]
-    place = corners @ axis
+    place = corners @ np.linalg.svd(points.T @ points)[0][:, 0]
     lowest, length = float(place.min()), float(np.ptp(place))
     return (place.mean(axis=1) - lowest) / max(length, 1e-300), length
 

@@ -74,7 +74,7 @@ def charts_of(found: Finished) -> list[list[int]]:
         ("frustum", 1),
         ("capped cylinder", 3),
         ("prism", 2),
-        ("L-bracket", 2),
+        ("L-bracket", 3),
         ("stairs", 2),
     ],
 )
