@@ -74,7 +74,7 @@ class SliverConfig:
 class ShortenConfig:
     """Charts too long for a page, cut across.  Lengths are shares of √(surface area)."""
 
-    above: float = 2.2
+    above: float = 2.1
     """Side of the square around a chart, straight or along its diagonal, above which it is cut: about a fifth of
     such a page is covered, or less."""
     to: float = 1.15
