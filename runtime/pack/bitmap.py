@@ -142,7 +142,9 @@ def nest(charts: list[list[Mask]], order: NDArray[np.int64], columns: int, *, mo
     most: height at which to give up.  None: then, or where a chart is wider than the columns.
     """
     stride, taken = columns + 1, 0
-    rows = sum(max(max(mask.height, mask.width) for mask in masks) for masks in charts)
+    extents = [max(max(mask.height, mask.width) for mask in masks) for masks in charts]
+    # a chart whose top is above ``most`` ends the search: no more rows than the tallest needs there
+    rows = int(min(sum(extents), most + max(extents) + 1))
     wall = np.zeros((rows + 1, stride), dtype=bool)
     wall[:, columns] = True
     taken = as_bits(wall)

@@ -34,9 +34,9 @@ class PlaceConfig:
     """Length of a chart, in sides of a square of the area of all charts, from which diagonals are tried for it."""
     tightness: float = 1.0
     """What a buried column counts against a top that is higher by as much."""
-    tries: int = 200
+    tries: int = 400
     """Orders that are tried at most …"""
-    dropped: int = 2000
+    dropped: int = 4000
     """… and charts that are dropped in all of them together."""
     shuffle: float = 0.3
     """By how much (natural logarithm) sizes are falsified for a new order, typically."""
@@ -58,9 +58,9 @@ class NestConfig:
     """How often their size is corrected."""
     slants: int = 1
     """Angles within a quarter turn at which charts are tried."""
-    tries: int = 12
+    tries: int = 24
     """Orders that are tried at most …"""
-    dropped: int = 600
+    dropped: int = 1200
     """… and charts that are laid in all of them together."""
     shuffle: float = 0.3
     """By how much (natural logarithm) sizes are falsified for a new order, typically."""
