@@ -39,7 +39,8 @@ def _module(name: str) -> Any:
 
 
 WAITS = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 try:
     print("x", file=sys.stderr, flush=True)
     time.sleep(60)
