@@ -53,6 +53,10 @@ class ForeignFileError(InputError):
     """The output would overwrite a file that flexpara did not write."""
 
 
+class DiskFullError(InputError):
+    """No room is left for the output: once there is, the same again may work."""
+
+
 class MissingDependencyError(FlexparaError, ImportError):
     """An optional dependency is absent; the message names the package and the command that installs it."""
 

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from .errors import ForeignFileError, InputError
+from .errors import DiskFullError, ForeignFileError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -128,7 +128,7 @@ class OutputFolder:
         self.check([name])
         staging = self._stage()
         before = set(self.names)
-        with _disk_full_is_said(self.folder):
+        with disk_full_is_said(self.folder):
             writer(staging / name)
         if not (staging / name).is_file():
             raise InputError(f"nothing was written as {name}; this is a defect worth reporting")
@@ -142,7 +142,7 @@ class OutputFolder:
         """
         staging = self._stage()
         before = set(self.names)
-        with _disk_full_is_said(self.folder):
+        with disk_full_is_said(self.folder):
             writer(staging)
         self.check(set(self.names) - before)
 
@@ -164,12 +164,12 @@ class OutputFolder:
         names = sorted(self.names, key=lambda name: (name == self.report_name, name))
         self.check(names)
         staging = self._stage()
-        with _disk_full_is_said(self.folder):
+        with disk_full_is_said(self.folder):
             for name in names:
                 _reach_disk(staging / name)
         journal = self.folder / f".{self.stem}{JOURNAL}"
         # killed between two moves, the next run knows by it whose files these are
-        with _disk_full_is_said(self.folder):
+        with disk_full_is_said(self.folder):
             replace_file(journal, json.dumps({"producer": PRODUCER, "files": names}).encode())
         for name in names:
             (staging / name).replace(self.folder / name)
@@ -254,13 +254,14 @@ def write_whole(path: Path, writer: Callable[[Path], object], *, force: bool = F
 
 
 @contextmanager
-def _disk_full_is_said(folder: Path) -> Iterator[None]:
+def disk_full_is_said(folder: Path) -> Iterator[None]:
+    """Within this, writing to a folder raises DiskFullError where its disk is full."""
     try:
         yield
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        raise InputError(
+        raise DiskFullError(
             f"the disk of {folder} is full ({error.strerror}), expected room for the output; free some, or choose "
             "another -o"
         ) from error

@@ -60,6 +60,7 @@ class Driver:
         self.manifest, self.version, self.work, self.limits, self.told = manifest, version, work, limits, told
         self.begin = time.monotonic()
         self.died: dict[str, int] = {}
+        self.content: dict[str, str] = {}
 
     def run(self, jobs: list[Job], cores: list[list[int]]) -> bool:
         """Work all jobs off with a worker for each group of cores; False where an interrupt ended it before."""
@@ -85,8 +86,12 @@ class Driver:
         return not queue and not any(worker.job for worker in workers)
 
     def start(self, worker: Worker, job: Job) -> None:
-        """Give a job to a worker that has none; what a killed one left in its folder goes first."""
+        """Give a job to a worker that has none; what a killed one left in its folder goes first.
+
+        The fingerprint of its file is taken now: one that changes meanwhile is done again.
+        """
         sweep(job.run.output)
+        self.content[job.name] = job.content()
         worker.begin(job)
 
     def collect(self, worker: Worker, queue: list[Job]) -> None:
@@ -119,8 +124,8 @@ class Driver:
         """Write what became of a job down."""
         elapsed = round(time.monotonic() - self.begin, 3)
         folder = os.path.relpath(job.run.output, self.manifest.parent)
-        asked = job.asked(self.version)
-        entry = Entry(job.name, **facts, content=job.content(), asked=asked, folder=folder, elapsed=elapsed)
+        content, asked = self.content[job.name], job.asked(self.version)
+        entry = Entry(job.name, **facts, content=content, asked=asked, folder=folder, elapsed=elapsed)
         append(self.manifest, entry)
         self.told(entry)
 

@@ -59,6 +59,8 @@ def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: O
     found: dict[Path, tuple[str, Options, Outputs]] = {}
     for path in assets:
         found |= _listed(path, options, outputs) if path.suffix in LISTS else _found(path, options, outputs)
+    # results of an earlier run, where they lie in the folder that is searched
+    found = {path: entry for path, entry in found.items() if output.absolute() not in path.parents}
     stems = Counter(str(Path(name).with_suffix("")) for name, _, _ in found.values())
     jobs = []
     for path, (name, own_options, own_outputs) in found.items():

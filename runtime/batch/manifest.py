@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..files import disk_full_is_said
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,7 +30,8 @@ class Entry:
 
     status: "done" or "failed".  content, asked: fingerprints of its file and its options.  seconds: of the whole asset;
     stages: of each.  memory: peak of the process, bytes.  metrics: from its report.  files: sha256 of each, by name.
-    elapsed: seconds since its run of the batch began.  again: it failed by a death of its worker, and is tried again.
+    elapsed: seconds since its run of the batch began.
+    again: what it failed by may pass, the death of a worker or a full disk.
     """
 
     asset: str
@@ -79,10 +81,10 @@ def read_entries(path: Path) -> dict[str, Entry]:
 def append(path: Path, entry: Entry) -> None:
     """Add a line, on the disk when this returns; what a kill left of a last line is ended first.
 
-    Raises: OSError.
+    Raises: DiskFullError; OSError for what else keeps it from being written.
     """
     line = json.dumps(asdict(entry), ensure_ascii=False, allow_nan=False).encode() + b"\n"
-    with path.open("ab+") as file:
+    with disk_full_is_said(path.parent), path.open("ab+") as file:
         if file.tell() and not _ends_whole(file.fileno(), file.tell()):
             _cut_last_line(file.fileno(), file.tell())
         file.seek(0, os.SEEK_END)

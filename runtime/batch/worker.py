@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FlexparaError
+from ..errors import DiskFullError, FlexparaError
 from ..runfile import Run, run_of
 
 if TYPE_CHECKING:
@@ -64,7 +64,8 @@ def answer(function: Callable[[Run], object], run: Run) -> dict[str, Any]:
         function(run)
         facts: dict[str, Any] = {"status": "done", **outcome(run.output)}
     except FlexparaError as error:
-        facts = {"status": "failed", "error": " ".join(str(error).split())}
+        said = " ".join(str(error).split())
+        facts = {"status": "failed", "error": said, "again": isinstance(error, DiskFullError)}
     except MemoryError:
         facts = {"status": "failed", "error": "out of memory, expected less to be enough; give it a machine with more"}
     except Exception as error:  # a defect in one asset must not end the others

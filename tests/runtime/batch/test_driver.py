@@ -15,7 +15,7 @@ import pytest
 from flexpara.runtime.batch.driver import Driver, Limits, shares_of_cores
 from flexpara.runtime.batch.jobs import Job, find_jobs
 from flexpara.runtime.batch.lock import locked
-from flexpara.runtime.batch.manifest import Entry, read_entries
+from flexpara.runtime.batch.manifest import Entry, left_to_do, read_entries
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.options.unwrap import Options, Outputs
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are wat
 NO_LIMITS = Limits()
 WORKS = """
 import json, os, signal, time
-from flexpara.runtime.errors import InputError
+from flexpara.runtime.errors import DiskFullError, InputError
 
 def write(run):
     run.output.mkdir(parents=True, exist_ok=True)
@@ -47,6 +47,10 @@ def by_name(run):
         time.sleep(60)
     if name.startswith("refused"):
         raise InputError("value, expected another; correct it")
+    if name.startswith("full"):
+        raise DiskFullError("the disk is full, expected room; free some")
+    if name.startswith("changes"):
+        run.mesh.write_text("# later")
     if name.startswith("defect"):
         raise ValueError("oh")
     print("noise on stdout")
@@ -89,6 +93,14 @@ def test_each_job_ends_with_its_entry(tmp_path: Path, works: str) -> None:
     assert list(found["a.obj"].files) == ["a.report.json"]
     assert found["refused.obj"].error == "value, expected another; correct it"
     assert found["defect.obj"].error.startswith("ValueError: oh (works.py:")
+
+
+def test_what_may_pass_or_changes_meanwhile_is_done_again(tmp_path: Path, works: str) -> None:
+    jobs = jobs_in(tmp_path, "changes", "full", "refused", "z")
+    found = worked(jobs, tmp_path, works)
+    assert found["full.obj"].again
+    assert not found["refused.obj"].again
+    assert [job.name for job in left_to_do(jobs, found, "1", retry=False)] == ["changes.obj", "full.obj"]
 
 
 def test_a_worker_that_dies_is_replaced_and_its_job_tried_again(tmp_path: Path, works: str) -> None:

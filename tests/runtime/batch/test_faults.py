@@ -69,12 +69,12 @@ def undisturbed(meshes: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[
 
 
 def workers_of(driver: int) -> list[int]:
-    """The spawned workers of a driver: its children that are not the resource tracker."""
-    found = []
-    for child in Path(f"/proc/{driver}/task/{driver}/children").read_text(encoding="ascii").split():
-        words = Path(f"/proc/{child}/cmdline").read_bytes()
-        found += [int(child)] if b"spawn_main" in words else []
-    return found
+    """The workers of a driver; none once it has ended."""
+    try:
+        children = Path(f"/proc/{driver}/task/{driver}/children").read_text(encoding="ascii").split()
+    except OSError:
+        return []
+    return [int(child) for child in children if b"batch.worker" in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
 def test_each_asset_has_the_bytes_of_a_single_run(meshes: Path, undisturbed: dict[str, object], tmp_path: Path) -> None:
@@ -90,9 +90,11 @@ def test_a_killed_worker_costs_nothing_but_time(
     meshes: Path, undisturbed: dict[str, object], tmp_path: Path, seed: int
 ) -> None:
     run = begun(meshes, tmp_path)
-    time.sleep(Random(seed).uniform(0.8, 2.5))
-    for worker in workers_of(run.pid)[:1] if run.poll() is None else ():
-        os.kill(worker, signal.SIGKILL)
+    while not (workers := workers_of(run.pid)):
+        assert run.poll() is None, "the batch ended before a worker was seen"
+        time.sleep(0.02)
+    time.sleep(Random(seed).uniform(0.0, 1.0))
+    os.kill(workers[0], signal.SIGKILL)
     assert ended(run)[0] == 0
     assert content(tmp_path) == undisturbed
 
@@ -101,10 +103,12 @@ def test_a_killed_worker_costs_nothing_but_time(
 def test_a_killed_driver_leaves_what_the_next_run_completes(
     meshes: Path, undisturbed: dict[str, object], tmp_path: Path, seed: int
 ) -> None:
-    run = begun(meshes, tmp_path)
-    time.sleep(Random(seed).uniform(0.3, 3.0))
-    run.kill()
-    ended(run)
+    moments = Random(seed)
+    for _ in range(1 + seed % 4):
+        run = begun(meshes, tmp_path)
+        time.sleep(moments.uniform(0.3, 3.0))
+        run.kill()
+        ended(run)
     code, said = ended(begun(meshes, tmp_path))
     assert code == 0, said
     assert content(tmp_path) == undisturbed

@@ -80,6 +80,12 @@ def test_what_is_not_there_or_empty_is_refused(tmp_path: Path) -> None:
         jobs_of(tmp_path)
 
 
+def test_results_in_the_folder_that_is_searched_are_no_assets(tmp_path: Path) -> None:
+    for name in ("a.obj", "out/a/a.obj"):
+        mesh(tmp_path / name)
+    assert [job.name for job in find_jobs([tmp_path], tmp_path / "out", Options(), Outputs())] == ["a.obj"]
+
+
 def test_shards_share_all_assets(tmp_path: Path) -> None:
     for number in range(7):
         mesh(tmp_path / f"{number}.obj")
