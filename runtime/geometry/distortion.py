@@ -42,5 +42,5 @@ def oriented_energy(jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def excess(energy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(f,) what an energy (f,) has above isometry, at most `MOST_EXCESS` per face."""
-    return np.minimum(energy - 1.0, MOST_EXCESS)
+    """(f,) what an energy (f,) has above isometry, at most `MOST_EXCESS` per face, and by no rounding less than 0."""
+    return np.clip(energy - 1.0, 0.0, MOST_EXCESS)

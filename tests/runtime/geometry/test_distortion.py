@@ -45,3 +45,4 @@ def test_the_oriented_energy_is_the_symmetric_dirichlet_energy_and_infinite_for_
 
 def test_the_excess_of_a_face_is_capped() -> None:
     assert excess(np.array([1.0, 1.5, 30.0, np.inf])).tolist() == [0.0, 0.5, 10.0, 10.0]
+    assert excess(np.array([1.0 - 1e-16, 0.5])).tolist() == [0.0, 0.0]

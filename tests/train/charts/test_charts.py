@@ -279,3 +279,18 @@ def test_a_real_mesh_gets_few_charts_of_little_stretch_and_short_seams(
     energy = sum(piece.energy for piece in found.pieces)
     assert energy < excess
     assert (found.objective - energy) / CONFIG.slit.price < seams
+
+
+def test_a_spiral_ribbon_beside_something_larger_ends_though_it_costs_nothing() -> None:
+    """Searched as one of little area, it unfolds exactly: a cost that a rounding took below zero was behind itself."""
+    turn = np.linspace(0.0, 6.0 * np.pi, 200)
+    radius = 1.0 + turn / 9.0
+    edge = np.round(np.stack([3.0 + np.cos(turn) * radius, np.sin(turn) * radius, 0.0 * turn], axis=1), 6)
+    k = np.arange(199)
+    faces = np.concatenate([np.stack([k, k + 1, k + 200], axis=1), np.stack([k + 1, k + 201, k + 200], axis=1)])
+    ribbon = np.concatenate([edge, edge + np.array([0.0, 0.0, 0.3])])
+    far = np.array([[50.0, 0.0, 0.0], [70.0, 0.0, 0.0], [50.0, 20.0, 0.0]])
+    both = Surface(np.concatenate([ribbon, far]), np.concatenate([faces, [[400, 401, 402]]]))
+    found = charted(both)
+    assert_valid(found, both)
+    assert stretch(found) <= 1.0001
