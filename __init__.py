@@ -254,7 +254,7 @@ class UnwrapResult(Saving):
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.output import BakeJob, result_notes, write_outputs, write_reports
+        from .bake.results.output import BakeJob, result_notes, write_outputs, write_reports
         from .export.assemble import write_networks
         from .runtime.io.changes import lost, told
         from .runtime.io.points.written import point_files, write_points
@@ -309,7 +309,7 @@ class UnwrapPages(Saving):
         note: Callable[[str], None] | None = None,
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder."""
-        from .bake.pages import check_pages, page_jobs, page_notes, write_pages
+        from .bake.results.pages import check_pages, page_jobs, page_notes, write_pages
         from .export.assemble import write_networks
         from .runtime.progress import Clock
 

@@ -181,7 +181,7 @@ def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
 
         with requires("bake"):
             from .bake.files.gltfmade import with_document
-            from .bake.pages import check_pages
+            from .bake.results.pages import check_pages
         check_pages(folder, run.outputs, pages_of(with_document(source), run.options.atlas))
 
 

@@ -13,13 +13,13 @@ import numpy as np
 
 from ..runtime.errors import InputError
 from ..runtime.options.keywords import from_keywords
-from .closing import ClosingConfig, closed_seams
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
 from .raster.plan import Plan, open_rasterizer
-from .seamcheck import agrees_across_seams, find_seams, sample_seams, seam_error
+from .seams.closing import ClosingConfig, closed_seams
+from .seams.seamcheck import agrees_across_seams, find_seams, sample_seams, seam_error
 from .settings import BakeSettings
 from .texture import Texture
 from .windows import Ground, background_of, blank_gbuffer, computed, map_windows, put_together

@@ -54,7 +54,7 @@ def with_background(entry: BakeMap, outputs: Outputs) -> BakeMap:
     """The map with the background asked for, where it is one of colours; others keep their neutral value."""
     if outputs.background is None or entry.encoding != "srgb":
         return entry
-    from .color import linear_from_srgb
+    from .colors.color import linear_from_srgb
 
     levels = np.array([int(outputs.background[start : start + 2], 16) for start in (1, 3, 5)])
     return replace(entry, background=tuple(linear_from_srgb(levels / 255.0).tolist()))

@@ -27,7 +27,7 @@ from ..runtime.options.unwrap import (
 from ..runtime.options.words import Paths
 from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
-from .output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
+from .results.output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 
 if TYPE_CHECKING:
     from ..runtime.files import OutputFolder
@@ -165,7 +165,7 @@ def _bake_one(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any
 
 def _bake_squares(folder: OutputFolder, job: BakeJob, options: BakeOptions) -> dict[str, Any]:
     """Bake and write one image for each map and square of uv; the squares' numbers for the report."""
-    from .udim import bake_udim, write_udim
+    from .results.udim import bake_udim, write_udim
 
     gutter = gutter_of(job.atlas, job.outputs)
     tiles = bake_udim(job.atlas, job.asset, list(job.maps), size=options.size, padding=gutter, samples=options.samples)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from . import seamcheck
-from .closing import ClosingConfig
 from .highpoly import cage, highpoly
 from .maps import curvature, occlusion, resample
 from .raster import background, gbuffer, gutter
+from .seams import seamcheck
+from .seams.closing import ClosingConfig
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..runtime.geometry.layout import EDGE
-from ..runtime.pack.seamvertices import split_vertices
+from ..runtime.pack.exact.seamvertices import split_vertices
 
 if TYPE_CHECKING:
     from ..runtime.mesh import Atlas

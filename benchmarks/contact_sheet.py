@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexpara.bake.color import chart_colors, linear_from_srgb
+from flexpara.bake.colors.color import chart_colors, linear_from_srgb
+from flexpara.bake.colors.lettering import text_cover, with_text
 from flexpara.bake.files.images import write_png
-from flexpara.bake.lettering import text_cover, with_text
 from flexpara.bake.pictures.canvas import Camera, Lines, draw, three_quarter_axes
 from flexpara.bake.pictures.preview import INK, PAPER, checker_cells, layout, shading_normals, solid
 from flexpara.bake.raster.context import open_context
-from flexpara.bake.seamcheck import seam_edges
+from flexpara.bake.seams.seamcheck import seam_edges
 from flexpara.bake.texture import Texture
 from flexpara.runtime.errors import InputError
 

@@ -18,7 +18,7 @@ from flexpara.runtime.files import write_whole
 from flexpara.runtime.geometry.metrics import measure, uv_charts
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
-from flexpara.runtime.pack.seamvertices import atlas_normals, split_vertices
+from flexpara.runtime.pack.exact.seamvertices import atlas_normals, split_vertices
 
 from .contact_sheet import render_sheet
 from .paper import outcomes_of, with_common_options, with_meshes, words

@@ -22,8 +22,8 @@ from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.geometry.triangles import signed_areas
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Surface
+from flexpara.runtime.pack.exact.seamvertices import split_vertices
 from flexpara.runtime.pack.repack import repack
-from flexpara.runtime.pack.seamvertices import split_vertices
 from flexpara.runtime.pack.square import Square
 
 from .peers import by_xatlas

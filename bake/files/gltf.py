@@ -16,7 +16,7 @@ from ... import __version__
 from ...runtime.errors import ShapeError
 from ...runtime.io.gltf.buffers import parse_tree
 from ...runtime.io.gltf.editing import save
-from ..color import linear_from_srgb
+from ..colors.color import linear_from_srgb
 from ..maps.tangents import unit, vertex_tangents
 from .glbbuffer import Buffer, gl
 from .gltfmaterial import add_material

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.errors import FlexparaError, InputError, MissingDependencyError
-from ..color import srgb_bytes_from_linear, srgb_from_linear
+from ..colors.color import srgb_bytes_from_linear, srgb_from_linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

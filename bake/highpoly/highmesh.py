@@ -14,7 +14,7 @@ from ...runtime.io.shading import shaded
 from ...runtime.material import Material
 from ...runtime.mesh import Asset, Atlas, Surface
 from ...runtime.options.unwrap import SourceOptions
-from ...runtime.pack.seamvertices import atlas_normals
+from ...runtime.pack.exact.seamvertices import atlas_normals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..color import linear_from_oklab
-from ..lettering import text_cover
+from ..colors.color import linear_from_oklab
+from ..colors.lettering import text_cover
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.geometry.metrics import face_distortion
-from ..color import chart_colors
-from ..heat import distortion_scale, heat_colors, signed_distortion
+from ..colors.color import chart_colors
+from ..colors.heat import distortion_scale, heat_colors, signed_distortion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

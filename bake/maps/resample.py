@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...runtime.geometry.triangles import cross_2d
-from ..color import byte_to_linear
+from ..colors.color import byte_to_linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,11 +14,11 @@ import numpy as np
 from ...runtime.errors import InputError
 from ...runtime.files import write_whole
 from ...runtime.options.seams import AUTO
-from ..color import chart_colors
+from ..colors.color import chart_colors
+from ..colors.lettering import with_text
 from ..files.images import write_png
-from ..lettering import with_text
 from ..raster.context import open_context
-from ..seamcheck import seam_edges
+from ..seams.seamcheck import seam_edges
 from ..texture import Texture
 from .canvas import Camera, Lines, draw, three_quarter_axes
 from .preview import FOOT, INK, LETTER_HEIGHT, LETTERS, PAPER, checker_cells, counted, layout, shading_normals, solid

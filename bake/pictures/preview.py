@@ -14,12 +14,12 @@ import numpy as np
 
 from ...runtime.geometry.metrics import face_distortion
 from ...runtime.sessions.wrapagreement import corner_normals
-from ..color import chart_colors
+from ..colors.color import chart_colors
+from ..colors.heat import distortion_scale, face_areas, heat_colors, signed_distortion
+from ..colors.lettering import with_text
 from ..files.images import write_png
-from ..heat import distortion_scale, face_areas, heat_colors, signed_distortion
-from ..lettering import with_text
 from ..raster.context import open_context
-from ..seamcheck import chart_outlines, seam_edges
+from ..seams.seamcheck import chart_outlines, seam_edges
 from ..texture import Texture
 from .canvas import Camera, Lines, Shape, draw, three_quarter_axes
 

@@ -18,7 +18,7 @@ from ...runtime.pack.square import square_of
 from ...runtime.progress import Clock
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
-from ..output import BakeJob, texture_notes, write_outputs
+from ..results.output import BakeJob, texture_notes, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -21,8 +21,8 @@ from PIL import Image
 
 from ... import __version__
 from ...runtime.mesh import Frame
-from ..color import chart_colors, srgb_bytes_from_linear
-from ..heat import heat_colors
+from ..colors.color import chart_colors, srgb_bytes_from_linear
+from ..colors.heat import heat_colors
 from ..maps.checker import uv_card
 from .pictures import data_uri
 from .words import table

@@ -15,7 +15,7 @@ from PIL import Image
 
 from ...runtime.errors import FlexparaError, InputError
 from ...runtime.io.pictures import demand_texels, inside
-from ..color import srgb_from_linear
+from ..colors.color import srgb_from_linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -16,8 +16,8 @@ from ...runtime.geometry.overlap import orientation_sign, overlapping_pairs
 from ...runtime.geometry.topology import edge_table
 from ...runtime.geometry.triangles import jacobians, signed_areas, triangle_areas
 from ...runtime.mesh import Surface
-from ...runtime.pack.seamvertices import atlas_normals
-from ..heat import distortion_scale
+from ...runtime.pack.exact.seamvertices import atlas_normals
+from ..colors.heat import distortion_scale
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

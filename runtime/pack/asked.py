@@ -12,8 +12,8 @@ import numpy as np
 
 from ..mesh import Charts, Surface
 from .density import pack_square
-from .lattice import STEPS
-from .outlines import chart_outlines, outline_edges
+from .exact.lattice import STEPS
+from .growing.outlines import chart_outlines, outline_edges
 from .packing import Packed, atlas_of_corners, on_lattice
 from .stacking import Stacks, find_stacks
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .config import PackConfig
-from .lattice import STEPS
-from .outlines import chart_outlines, outline_edges
+from .exact.lattice import STEPS
+from .growing.outlines import chart_outlines, outline_edges
+from .layouts.texels import aligned
 from .packing import Fitted, Packed, as_atlas, on_lattice, pack
-from .texels import aligned
 
 if TYPE_CHECKING:
     from ..mesh import Asset, Charts

@@ -23,13 +23,13 @@ from ..geometry.metrics import uv_charts
 from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
 from .config import PackConfig
-from .growth import apply_placement, grown
-from .lattice import STEPS, Snapped, snap
-from .nesting import find_nested
-from .outlines import chart_outlines, outline_edges, rotation, upright_angle
-from .placement import Layout, find_layout
-from .seamvertices import atlas_normals, split_vertices
-from .texels import aligned
+from .exact.lattice import STEPS, Snapped, snap
+from .exact.seamvertices import atlas_normals, split_vertices
+from .growing.growth import apply_placement, grown
+from .growing.outlines import chart_outlines, outline_edges, rotation, upright_angle
+from .layouts.nesting import find_nested
+from .layouts.placement import Layout, find_layout
+from .layouts.texels import aligned
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..geometry.triangles import signed_areas
-from .outlines import rotation
+from .growing.outlines import rotation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

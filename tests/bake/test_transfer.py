@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.baker import bake
-from flexpara.bake.color import srgb_exact
+from flexpara.bake.colors.color import srgb_exact
 from flexpara.bake.files.images import quantize
 from flexpara.bake.maps.material import base_color_map, emissive_map, metallic_roughness_map, occlusion_map
 from flexpara.bake.maps.normals import object_normal_map

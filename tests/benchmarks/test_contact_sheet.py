@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("moderngl")
 
 from benchmarks import contact_sheet
-from flexpara.bake.color import chart_colors, srgb_exact
+from flexpara.bake.colors.color import chart_colors, srgb_exact
 from flexpara.bake.files.images import read_image
 from flexpara.bake.pictures.preview import PAPER
 from flexpara.runtime.errors import InputError

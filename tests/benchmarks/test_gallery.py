@@ -14,7 +14,7 @@ from benchmarks import gallery, paper
 from benchmarks.contact_sheet import BAND, COLUMNS, PANEL
 from benchmarks.systems import Answer, Job, Outcome
 from flexpara.bake.files.images import read_image
-from flexpara.bake.seamcheck import chart_outlines, seam_edges
+from flexpara.bake.seams.seamcheck import chart_outlines, seam_edges
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Surface
 

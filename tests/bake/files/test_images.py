@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexpara.bake.color import byte_to_linear, srgb_exact
+from flexpara.bake.colors.color import byte_to_linear, srgb_exact
 from flexpara.bake.files.images import (
     EncodingError,
     bayer_threshold,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flexpara.bake.files.gltf import write_glb
 from flexpara.bake.files.usd import write_usda
 from flexpara.bake.files.written import Reading, corner_uv_of, written_report
-from flexpara.bake.output import written_notes
+from flexpara.bake.results.output import written_notes
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.io.obj.write import write_obj

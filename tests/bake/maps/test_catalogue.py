@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from flexpara.bake.color import chart_colors
+from flexpara.bake.colors.color import chart_colors
 from flexpara.bake.maps.catalogue import MAP_NAMES, all_maps, find_map
 from flexpara.bake.maps.normals import to_tangent_space
 from flexpara.bake.maps.tangents import unit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexpara.bake.lettering import text_cover
+from flexpara.bake.colors.lettering import text_cover
 from flexpara.bake.maps.checker import ARROW_ROW, CELLS, DOTS, LABEL, LABEL_ROW, uv_card
 
 

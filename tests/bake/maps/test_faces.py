@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 
 from flexpara.bake.baker import bake
-from flexpara.bake.color import chart_colors
+from flexpara.bake.colors.color import chart_colors
 from flexpara.bake.maps.faces import distortion_map, face_id_map, material_id_map
 from flexpara.bake.maps.material import metallic_roughness_map, occlusion_map, orm_map
 from flexpara.bake.raster.gbuffer import rasterize

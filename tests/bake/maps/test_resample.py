@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexpara.bake.color import byte_to_linear
+from flexpara.bake.colors.color import byte_to_linear
 from flexpara.bake.maps.resample import (
     FootprintSampler,
     SourceTexture,

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexpara.bake.color import chart_colors, srgb_bytes_from_linear
+from flexpara.bake.colors.color import chart_colors, srgb_bytes_from_linear
+from flexpara.bake.colors.heat import heat_colors
 from flexpara.bake.files.images import read_image
-from flexpara.bake.heat import heat_colors
 from flexpara.bake.pictures import preview
 from flexpara.runtime.mesh import Asset, Atlas, Surface
 

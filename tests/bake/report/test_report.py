@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from flexpara.__main__ import main
-from flexpara.bake.heat import signed_distortion
+from flexpara.bake.colors.heat import signed_distortion
 from flexpara.bake.report.gather import ReportSettings, read_report, results_in, told_apart
 from flexpara.bake.report.page import html_of, packed
 from flexpara.bake.report.pictures import picture_file

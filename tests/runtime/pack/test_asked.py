@@ -10,7 +10,7 @@ import pytest
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Surface
 from flexpara.runtime.pack.asked import pack_asked
-from flexpara.runtime.pack.outlines import rotation
+from flexpara.runtime.pack.growing.outlines import rotation
 from flexpara.runtime.pack.square import Square
 from flexpara.runtime.pack.stacking import MIRROR
 

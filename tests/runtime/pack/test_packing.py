@@ -15,7 +15,7 @@ from flexpara.runtime.geometry.overlap import overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table, face_components
 from flexpara.runtime.geometry.triangles import signed_areas
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Surface
-from flexpara.runtime.pack.growth import apply_placement
+from flexpara.runtime.pack.growing.growth import apply_placement
 from flexpara.runtime.pack.packing import atlas_from_uv, pack
 
 if TYPE_CHECKING:

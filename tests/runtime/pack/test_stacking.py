@@ -7,7 +7,7 @@ import pytest
 
 from flexpara.runtime.mesh import Charts
 from flexpara.runtime.pack.config import StackConfig
-from flexpara.runtime.pack.outlines import rotation
+from flexpara.runtime.pack.growing.outlines import rotation
 from flexpara.runtime.pack.stacking import MIRROR, Stacks, find_stacks
 
 SCALENE = np.array([[[0.0, 0.0], [3.0, 0.0], [0.5, 1.0]]])

@@ -1,0 +1,158 @@
+"""The mesh files of a run, each format with what it can hold, and what was read back of them.
+
+OpenGL and image libraries are imported when something needs them: an obj file alone does without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...runtime.extras import requires
+from ...runtime.io.gltf.instances import every_instance
+from ...runtime.io.loops import loops_of
+from ...runtime.io.npz import write_npz
+from ...runtime.material import used_materials
+from ...runtime.options.unwrap import SCENES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from ...runtime.files import OutputFolder
+    from ...runtime.mesh import Asset, Atlas
+    from ...runtime.options.unwrap import Outputs
+    from ..texture import Texture
+
+USD_KEYS = {"orm": "occlusionRoughnessMetallic"}
+"""Products of the USD preset that have another name among flexpara's own maps."""
+SHOWN = ("base-color", "uv-checker", "chart")
+"""The first of these maps that was baked is the colour in formats that have one picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshJob:
+    """What is written: an atlas of an asset with its textures.
+
+    files: product (a map, or a packed file of a target) → name of the file that was written of it.
+    """
+
+    atlas: Atlas
+    asset: Asset
+    outputs: Outputs
+    textures: Mapping[str, Texture]
+    files: Mapping[str, str]
+
+
+def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> dict[str, dict[str, Any]]:
+    """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
+    job = replace(job, asset=_as_scene(job.asset, job.outputs))
+    spread, own = every_instance(job.atlas, job.asset)
+    flat = replace(job, atlas=spread)
+    writers: dict[str, Callable[[Path], None]] = {
+        "glb": lambda path: _write_gltf(job, path),
+        "gltf": lambda path: _write_gltf(job, path),
+        "obj": lambda path: _write_obj(flat, path),
+        "ply": lambda path: _write_ply(flat, path),
+        "usda": lambda path: _write_usda(flat, path),
+        "npz": lambda path: write_npz(spread, job.asset, path),
+    }
+    staged: dict[str, Path] = {}
+
+    def write(kind: str, path: Path) -> None:
+        writers[kind](path)
+        staged[kind] = path
+
+    for kind in (name for name in writers if name in job.outputs.formats):
+        output.write(f"{job.asset.stem}.{kind}", partial(write, kind))
+    from ..files.written import Reading, parts_of, written_report
+
+    staged.pop("npz", None)  # the arrays themselves
+    uv = job.atlas.uv[job.atlas.faces]
+    order, parts = parts_of(job.asset, job.outputs.uv_set or 0)
+    scenes = {kind: path for kind, path in staged.items() if kind in SCENES}
+    plain = {kind: path for kind, path in staged.items() if kind not in SCENES}
+    fans = spread.uv[loops_of(spread, job.asset).triangles]
+    return {
+        **written_report(scenes, uv[order], Reading(apart=apart, parts=parts)),
+        **written_report(plain, uv, Reading(apart=apart, fans=fans, faces=own)),
+    }
+
+
+def write_scenes(output: OutputFolder, jobs: Sequence[MeshJob], *, apart: bool = False) -> dict[str, dict[str, Any]]:
+    """The scene that all jobs are pages of, in each format asked for; what was read back, as `write_meshes`."""
+    from ..files.written import Reading, parts_of, written_report
+
+    formats, uv_set = jobs[0].outputs.formats, jobs[0].outputs.uv_set
+    staged: dict[str, Path] = {}
+
+    def write(kind: str, path: Path) -> None:
+        _write_scene(jobs, path)
+        staged[kind] = path
+
+    for kind in formats:
+        output.write(f"{output.stem}.{kind}", partial(write, kind))
+    found = [(job.atlas.uv[job.atlas.faces], *parts_of(job.asset, uv_set or 0)) for job in jobs]
+    reading = Reading(apart=apart, parts=[part for _, _, parts in found for part in parts])
+    return written_report(staged, np.concatenate([uv[order] for uv, order, _ in found]), reading)
+
+
+def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
+    """With a document for what is written as one: several materials, or uv that go beside others."""
+    wanted = outputs.uv_set is not None or len(used_materials(asset)) > 1
+    if asset.document is not None or not wanted or set(SCENES).isdisjoint(outputs.formats):
+        return asset
+    with requires("bake"):
+        from ..files.gltfmade import with_document
+    return with_document(asset)
+
+
+def _write_gltf(job: MeshJob, path: Path) -> None:
+    """A .glb or .gltf file: the document with new uv, where there is one."""
+    if job.asset.document is not None:
+        _write_scene([job], path)
+        return
+    with requires("bake"):
+        from ..files.gltf import write_glb
+    write_glb(job.atlas, job.asset, job.textures, path)
+
+
+def _write_scene(jobs: Sequence[MeshJob], path: Path) -> None:
+    """The document of all jobs, each of which is a page of it."""
+    with requires("bake"):
+        from ..files.gltfscene import Page, write_scene
+    write_scene([Page(job.atlas, job.asset, job.textures, job.outputs.uv_set) for job in jobs], path)
+
+
+def _write_obj(job: MeshJob, path: Path) -> None:
+    """The source's own lines where it is an OBJ file; with materials that name the pictures."""
+    shown = next((job.files[name] for name in SHOWN if name in job.files), None)
+    if job.asset.obj is None:
+        from ...runtime.io.obj.write import write_obj
+
+        write_obj(job.atlas, path, texture=shown, loops=loops_of(job.atlas, job.asset))
+        return
+    from ...runtime.io.obj.rewrite import rewrite_obj
+
+    pictures = {**job.files, **({} if shown is None else {"base-color": shown})}
+    rewrite_obj(job.atlas, job.asset, job.asset.obj, path, pictures)
+
+
+def _write_ply(job: MeshJob, path: Path) -> None:
+    """With the source's vertex colours."""
+    from ...runtime.io.ply.write import write_ply
+
+    write_ply(job.atlas, path, colors=job.asset.colors, loops=loops_of(job.atlas, job.asset))
+
+
+def _write_usda(job: MeshJob, path: Path) -> None:
+    """With a material that names the texture files beside it."""
+    with requires("bake"):
+        from ..files.usd import write_usda
+    color = job.textures.get("base-color")
+    alpha = color is not None and color.pixels.shape[2] == 4
+    named = {USD_KEYS.get(name, name): file for name, file in job.files.items()}
+    write_usda(job.atlas, job.asset, named, path, alpha=alpha)

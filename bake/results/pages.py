@@ -1,0 +1,64 @@
+"""Several atlases of one scene: each page with textures and a preview of its own, and one scene file of all.
+
+OpenGL and image libraries are imported when something needs them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..checks import check_outputs, chosen_maps, possible_files
+from .meshes import MeshJob, write_scenes
+from .output import BakeJob, bake_textures, texture_facts, texture_notes, write_preview, written_notes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from ...runtime.files import OutputFolder
+    from ...runtime.mesh import Asset, Atlas
+    from ...runtime.options.unwrap import Outputs
+    from ...runtime.progress import Clock
+
+
+def check_pages(output: OutputFolder, outputs: Outputs, pages: Iterable[Asset]) -> None:
+    """Refuse before the work what writing would refuse after it.
+
+    Raises: InputError for formats that hold one atlas; else as `checks.check_outputs`.
+    """
+    outputs.for_pages()
+    names: list[str] = []
+    for page in pages:
+        own = outputs.for_asset(page)
+        names += possible_files(page.stem, own, chosen_maps(own))
+        names += [f"{page.stem}.{ending}" for ending in ("onnx", *(["wrap.onnx"] if own.inverse else []))]
+        names += [f"{page.stem}.preview.png"] if own.preview else []
+    check_outputs(output, outputs, chosen_maps(outputs), more=names)
+
+
+def page_jobs(outputs: Outputs, pages: Sequence[tuple[Asset, Atlas]], seed: int) -> list[BakeJob]:
+    """What is baked of each page, where auto stands for what its own materials have.  seed: of the rays."""
+    chosen = [(asset, atlas, outputs.for_asset(asset)) for asset, atlas in pages]
+    return [BakeJob.of(atlas, asset, own, chosen_maps(own, seed=seed)) for asset, atlas, own in chosen]
+
+
+def write_pages(output: OutputFolder, jobs: Sequence[BakeJob], clock: Clock, *, apart: bool = False) -> dict[str, Any]:
+    """As `output.write_outputs` for several pages of one scene; "textures" has an entry for each.
+
+    apart: whether in no page two triangles are known to overlap.
+    """
+    facts, files = dict[str, Any](), list[MeshJob]()
+    for job in jobs:
+        baked = bake_textures(output, job, clock)
+        facts[job.asset.stem] = texture_facts(job.atlas, baked)
+        files.append(MeshJob(job.atlas, job.asset, job.outputs, baked.textures, baked.files))
+        if job.outputs.preview:
+            with clock.stage("preview"):
+                write_preview(output, job.atlas, job.asset)
+    with clock.stage("write"):
+        return {"textures": facts, "written": write_scenes(output, files, apart=apart)}
+
+
+def page_notes(facts: dict[str, Any]) -> list[str]:
+    """What a user should know of written pages: a line each."""
+    constant = [f"{stem}: {fact}" for stem, found in facts["textures"].items() for fact in texture_notes(found)]
+    return [*written_notes(facts["written"]), *constant]

@@ -1,0 +1,75 @@
+"""Padding, enforced: charts shrink or grow together until every two of them are exactly far enough apart.
+
+k charts · s outline segments · p pairs of segments.  All charts keep one common scale; distances are those of the
+outlines themselves.  Whatever places charts, this comes last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import FinishError
+from ...geometry.gaps import near_segments, segment_distance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..config import GrowthConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2)."""
+
+    local: NDArray[np.float64]
+    chart: NDArray[np.int64]
+    half: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    factor: float
+
+    def segments(self) -> NDArray[np.float64]:
+        """(s, 2, 2) where the segments lie, atlas units."""
+        return self.centre[self.chart][:, None] + self.factor * self.local
+
+
+def padded(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> Crowd:
+    """The crowd with the largest factor that keeps all distances exactly, charts where they are.
+
+    border: from each side of the square, apart: between two charts; atlas units.
+
+    Raises:
+        FinishError: the repairs that the config allows did not suffice.
+    """
+    room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
+    walls = float((room / np.maximum(crowd.half, 1e-300)).min())
+    spacing = max(config.sample / 2.0, apart / 2.0)
+    pairs = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart + spacing)
+    for _ in range(config.repairs):
+        crowd = replace(crowd, factor=largest_factor(crowd, pairs, apart, walls))
+        closest = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart)
+        if are_apart(crowd, closest, apart):
+            return crowd
+        pairs = np.concatenate([pairs, closest])
+    raise FinishError(
+        f"charts stay closer than {apart:.3g} of the atlas side after {config.repairs} repairs; please report"
+    )
+
+
+def largest_factor(crowd: Crowd, pairs: NDArray[np.int64], apart: float, walls: float) -> float:
+    """Largest factor up to walls, and 1.25 times the crowd's own, at which pairs (p, 2) of segments stay apart."""
+    low, high = 0.0, min(walls, 1.25 * crowd.factor)
+    if are_apart(replace(crowd, factor=high), pairs, apart):
+        return high
+    for _ in range(40):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if are_apart(replace(crowd, factor=middle), pairs, apart) else (low, middle)
+    return low
+
+
+def are_apart(crowd: Crowd, pairs: NDArray[np.int64], apart: float) -> bool:
+    """True where all pairs (p, 2) of segments keep their distance."""
+    segments = crowd.segments()
+    return not bool((segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]) < apart).any())

@@ -1,0 +1,181 @@
+"""The search for a layout: the size at which charts fill the square, then orders and widths that need less of it.
+
+k charts · cells: the unit of length on the way, the width of a column of the skyline (`skyline`).  A layout that needs
+a square of R cells becomes the atlas by a division by R; the smaller R, the larger the charts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import InputError
+from ..growing.outlines import rotation as rotation_by
+from .skyline import Drop, Profile, drop, profile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..config import PlaceConfig, Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the charts of one atlas lie.
+
+    angle: (k,) radians by which each is turned, on top of standing upright.  origin: (k, 2) atlas units, where the
+    origin of its turned coordinates goes.  scale: atlas units per source unit.
+    """
+
+    angle: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Shapes:
+    """The profiles of charts at one size: unit cells per source unit.  extent: (k,) their longer sides, cells.
+
+    narrowest: columns that the widest chart needs at least.
+    """
+
+    charts: list[list[Profile]]
+    angle: list[NDArray[np.float64]]
+    unit: float
+    extent: NDArray[np.float64]
+    narrowest: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What the search has: where charts lie, the square's side in cells, and the keys (k,) that order them."""
+
+    drop: Drop
+    side: float
+    keys: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Outlines:
+    """Upright outlines (k of (s, 2, 2)) of charts of that area, source units, and how they may be turned.
+
+    long: length of a chart, in sides of a square of the area, from which diagonals are tried.
+    """
+
+    outlines: list[NDArray[np.float64]]
+    area: float
+    rotation: Rotation
+    long: float
+
+    def shapes(self, unit: float, padding: float) -> _Shapes:
+        """Profiles at that size, at each angle they may have."""
+        charts, angles = [], []
+        for outline in self.outlines:
+            long = self.rotation == "any" and np.ptp(outline, axis=(0, 1)).max() > self.long * math.sqrt(self.area)
+            quarters = range(1 if self.rotation == "off" else 2)
+            turns = [0.5 * number for number in quarters]
+            shapes = [profile(outline @ rotation_by(turn * math.pi).T * unit, padding) for turn in turns]
+            turned = [shape.turned for shape in shapes]
+            alike = all(one.looks_like(other) for one, other in zip(shapes, turned, strict=True))
+            if not alike and self.rotation != "off":
+                turns, shapes = [*turns, 1.0, 1.5], [*shapes, *turned]
+            if long:
+                turns = [*turns, 0.25, 0.75]
+                shapes += [profile(outline @ rotation_by(turn * math.pi).T * unit, padding) for turn in turns[-2:]]
+            charts.append(shapes)
+            angles.append(np.array(turns) * math.pi)
+        extent = np.array([max(len(chart[0].low), chart[0].top) for chart in charts])
+        narrowest = max(min(len(shape.low) for shape in chart) for chart in charts)
+        return _Shapes(charts, angles, unit, extent, narrowest)
+
+
+def find_layout(
+    outlines: list[NDArray[np.float64]],
+    area: float,
+    padding: float,
+    config: PlaceConfig,
+    rng: np.random.Generator,
+    *,
+    rotation: Rotation = "any",
+) -> Layout:
+    """The best layout found.
+
+    Args:
+        outlines: k upright outlines (s, 2, 2), source units.
+        area: of all charts, source units squared.
+        padding: share of the atlas side.
+        config: numbers.
+        rng: for the orders that are tried.
+        rotation: how charts may be turned.
+
+    Raises:
+        InputError: the padding leaves no room for the charts.
+    """
+    columns = int(min(max(config.columns * math.sqrt(len(outlines)), config.least), config.most))
+    shapes, found = _sized(_Outlines(outlines, area, rotation, config.long), padding, columns, config)
+    found = _improved(shapes, found, config, rng)
+    chosen, rows = found.drop.angle.tolist(), range(len(outlines))
+    offset = np.array([shapes.charts[chart][chosen[chart]].offset for chart in rows])
+    angle = np.array([shapes.angle[chart][chosen[chart]] for chart in rows])
+    return Layout(angle, (found.drop.origin + offset) / found.side, shapes.unit / found.side)
+
+
+def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfig) -> tuple[_Shapes, _Found]:
+    """Shapes of the size at which a first layout needs almost all of the columns, never more, and that layout.
+
+    The padding is a share of the columns: in a square of as many or fewer it is kept.
+    """
+    k = len(outlines.outlines)
+    first = unit = columns * math.sqrt(config.fill / outlines.area)
+    room = 2.0 * padding * columns * math.sqrt(k)  # what padding takes does not shrink with the charts
+    shapes = outlines.shapes(unit, padding * columns)
+    for _ in range(config.sizings):
+        found = _first(shapes, columns, config)
+        if (1.0 - config.alike) * columns <= found.side <= columns:
+            return shapes, found
+        if unit < 1e-4 * first:
+            break
+        wanted = ((1.0 - config.alike / 2.0) * columns - room) / max(found.side - room, 1e-9)
+        unit *= min(max(wanted, 0.25), 2.0) if room < columns else 0.25
+        shapes = outlines.shapes(unit, padding * columns)
+    found = _first(shapes, columns, config)
+    if found.side > columns:
+        raise InputError(
+            f"{k} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
+            "texels; lower the padding or raise the size"
+        )
+    return shapes, found
+
+
+def _first(shapes: _Shapes, columns: int, config: PlaceConfig) -> _Found:
+    """The layout of charts in the order of their size, in the better of two squares."""
+    found = _dropped(shapes, shapes.extent, max(columns, shapes.narrowest), config.tightness)
+    width = max(int(math.sqrt(found.drop.width * found.drop.height)), shapes.narrowest)
+    again = _dropped(shapes, shapes.extent, width, config.tightness)
+    return again if again.side < found.side else found
+
+
+def _dropped(shapes: _Shapes, keys: NDArray[np.float64], width: int, tightness: float) -> _Found:
+    found = drop(shapes.charts, np.argsort(-keys, kind="stable"), width, tightness=tightness)
+    assert found is not None, "no chart is wider than the columns"
+    return _Found(found, found.side, keys)
+
+
+def _improved(shapes: _Shapes, found: _Found, config: PlaceConfig, rng: np.random.Generator) -> _Found:
+    """Other orders and a narrower square, from the best so far, as often as the number of charts allows."""
+    k = len(shapes.charts)
+    tries = min(config.tries, config.dropped // k) if k > 1 else 0
+    for number in range(tries):
+        width = max(math.ceil(found.side) - 1 - int(rng.integers(0, 3)), shapes.narrowest)
+        spread = config.shuffle * np.exp(rng.normal(size=1))
+        source = shapes.extent if number % 4 == 0 else found.keys
+        keys = source * np.exp(spread * rng.normal(size=k))
+        tightness = config.tightness * float(np.exp(rng.normal()))
+        order = np.argsort(-keys, kind="stable")
+        moved = drop(shapes.charts, order, width, tightness=tightness, most=found.side)
+        if moved is not None and moved.side < found.side:
+            found = replace(found, drop=moved, side=moved.side, keys=keys)
+    return found
