@@ -273,10 +273,12 @@ def doctor() -> int:
     The command ends with 0 whatever it finds. What is missing is marked ✗ and followed by its remedy.
     """
     from .runtime.doctor import Finding, cpu, onnx_providers, packages, probe
+    from .runtime.kernel.choice import describe
 
     findings = [
         *packages(),
         Finding("CPU", cpu()),
+        probe("kernel", describe, "install a C++ compiler, and flexpara again"),
         probe("ONNX providers", onnx_providers, "pip install onnxruntime"),
         probe("torch device", _torch_device, 'pip install "flexpara[train]"'),
         probe("OpenGL", _opengl, 'pip install "flexpara[bake]"; apt-get install libegl1 libgl1 libgl1-mesa-dri'),

@@ -45,7 +45,7 @@ make_venv() {
 
 # The stamp holds what the installed packages depend on: unchanged, the second run installs nothing.
 install_requirements() {
-    wanted=$(cat pyproject.toml scripts/constraints.txt | cksum)
+    wanted=$(cat pyproject.toml scripts/constraints.txt scripts/build_kernel.py runtime/kernel/*.?pp | cksum)
     if [ "$(cat .venv/installed 2>/dev/null)" != "$wanted" ]; then
         say "installing Python packages into .venv (several minutes the first time)"
         "$python" -m pip install --quiet --disable-pip-version-check -c scripts/constraints.txt -e ".[all,test,dev,docs]" ||

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kernel.choice import kernel
 from .triangles import cross_2d, signed_areas
 
 if TYPE_CHECKING:
@@ -33,6 +34,10 @@ def orientation_sign(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[
     Returns:
         (n,) int8: 1 counter-clockwise, −1 clockwise, 0 collinear.
     """
+    compiled = kernel()
+    found = compiled.orientation_sign(a, b, c) if compiled else None
+    if found is not None:
+        return found
     value, bound = _determinant(a, b, c)
     sign = np.sign(value).astype(np.int8)
     unsure = np.flatnonzero(~((np.abs(value) > bound) | (bound == 0.0)))
@@ -54,6 +59,10 @@ def overlapping_pairs(uv: NDArray[np.float64]) -> NDArray[np.int64]:
     Returns:
         (p, 2) int64, lower index first, sorted.
     """
+    compiled = kernel()
+    found = compiled.overlapping_pairs(uv) if compiled else None
+    if found is not None:
+        return found
     sign = orientation_sign(uv[:, 0], uv[:, 1], uv[:, 2])
     solid = np.flatnonzero(sign)
     triangles = np.where((sign < 0)[:, None, None], uv[:, ::-1], uv)[solid]
@@ -65,6 +74,10 @@ def overlapping_pairs(uv: NDArray[np.float64]) -> NDArray[np.int64]:
 
 def overlaps_anywhere(uv: NDArray[np.float64]) -> bool:
     """True where the interiors of two triangles (f, 3, 2) intersect: ``overlapping_pairs`` up to the first."""
+    compiled = kernel()
+    found = compiled.overlaps_anywhere(uv) if compiled else None
+    if found is not None:
+        return found
     sign = orientation_sign(uv[:, 0], uv[:, 1], uv[:, 2])
     solid = np.flatnonzero(sign)
     triangles = np.where((sign < 0)[:, None, None], uv[:, ::-1], uv)[solid]

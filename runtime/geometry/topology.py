@@ -13,6 +13,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..kernel.choice import kernel
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -49,6 +51,8 @@ class EdgeTable:
 
 def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     """Edges of faces (f, 3) int64.  Non-manifold edges are allowed; a face with a repeated vertex is not."""
+    if compiled := kernel():
+        return EdgeTable(*compiled.edge_table(faces))
     start = faces.reshape(-1).astype(np.int64)
     end = np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
     span = int(start.max(initial=0)) + 1
@@ -98,6 +102,8 @@ def face_components(n_faces: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]
     Returns:
         (n_faces,) int64 labels 0 … k − 1, numbered by the lowest face of each component.
     """
+    if compiled := kernel():
+        return compiled.face_components(n_faces, pairs)
     link = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n_faces, n_faces))
     return connected_components(link, directed=False)[1].astype(np.int64)
 
@@ -159,6 +165,8 @@ def split_non_manifold_vertices(
     """
     table = table or edge_table(faces)
     joined = table.manifold if cut_edges_mask is None else table.manifold & ~cut_edges_mask
+    if compiled := kernel():
+        return compiled.opened(faces, table.edge_halfedges, joined)
     fan = fans(faces, table.edge_halfedges[joined])
     first = np.flatnonzero(fan == np.arange(len(fan)))
     order = first[np.argsort(faces.reshape(-1)[first], kind="stable")]
@@ -203,6 +211,8 @@ def boundary_loops(faces: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     Returns:
         List of (n,) int64 vertex indices in order, the first not repeated; longest loop first, then lowest vertex.
     """
+    if compiled := kernel():
+        return compiled.boundary_loops(faces)
     cut_faces, old_vertex = split_non_manifold_vertices(faces)
     table = edge_table(cut_faces)
     half = table.edge_halfedges[table.boundary, 0]

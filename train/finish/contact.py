@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.distortion import excess, oriented_energy
+from ...runtime.geometry.distortion import MOST_EXCESS, excess, oriented_energy
 from ...runtime.geometry.overlap import overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table
+from ...runtime.kernel.choice import kernel
 from .flatten import Pins, Slim, jacobians, slim
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 def boundary_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(b, 2) directed boundary edges of faces (f, 3): the surface lies to their left in a flip-free uv."""
+    if compiled := kernel():
+        return compiled.boundary_edges(faces)
     table = edge_table(faces)
     half = table.edge_halfedges[table.edge_count == 1, 0]
     face, corner = half // 3, half % 3
@@ -138,6 +141,8 @@ def separate(
 
 def excess_energy(surface: Surface, uv: NDArray[np.float64]) -> float:
     """Σ area · (symmetric Dirichlet − 1), each face capped so that no sliver decides; source units squared."""
+    if compiled := kernel():
+        return compiled.excess_energy(surface.vertices, surface.faces, uv, MOST_EXCESS)
     return float(surface.face_areas() @ excess(oriented_energy(jacobians(surface, uv))))
 
 

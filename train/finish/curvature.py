@@ -8,6 +8,7 @@ The border itself then follows from u (Sawhney & Crane, Boundary First Flattenin
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from ...runtime.geometry.distortion import excess
 from ...runtime.geometry.triangles import corner_angles, triangle_cross
+from ...runtime.kernel.choice import kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,35 +30,95 @@ if TYPE_CHECKING:
 class Curvature:
     """What a piece's conformal factors follow from: its angles and cotangent weights, taken once.
 
-    turn (v,): sum of the corner angles at each vertex, in radians.  laplacian (v, v): positive semidefinite.
-    fan (v,): number of faces around each vertex.
+    A rim (v,) bool is where values are given; all else is inside.
     """
 
-    def __init__(self, turn: NDArray[np.float64], laplacian: sparse.csr_array, fan: NDArray[np.int64]) -> None:
-        self.turn, self.laplacian, self.fan = turn, laplacian, fan
+    def __init__(self, surface: Surface, config: CotangentConfig) -> None:
+        self.surface, self.config = surface, config
 
     @classmethod
     def of(cls, surface: Surface, config: CotangentConfig) -> Curvature:
         """The curvature of a surface."""
-        angle, cotangent = corner_angles(surface.triangles), corner_cotangents(surface.triangles)
-        turn = np.zeros(len(surface.vertices))
-        np.add.at(turn, surface.faces, angle)
-        fan = np.bincount(surface.faces.reshape(-1), minlength=len(surface.vertices))
-        return cls(turn, cotangent_laplacian(surface, cotangent, config), fan)
+        return Compiled(surface, config) if kernel() else cls(surface, config)
+
+    @cached_property
+    def turn(self) -> NDArray[np.float64]:
+        """(v,) sum of the corner angles at each vertex, in radians."""
+        turn = np.zeros(len(self.surface.vertices))
+        np.add.at(turn, self.surface.faces, corner_angles(self.surface.triangles))
+        return turn
+
+    @cached_property
+    def fan(self) -> NDArray[np.int64]:
+        """(v,) number of faces around each vertex."""
+        return np.bincount(self.surface.faces.reshape(-1), minlength=len(self.surface.vertices))
+
+    @cached_property
+    def laplacian(self) -> sparse.csr_array:
+        """(v, v), positive semidefinite."""
+        return cotangent_laplacian(self.surface, corner_cotangents(self.surface.triangles), self.config)
 
     def inside(self, rim: NDArray[np.bool_]) -> tuple[NDArray[np.int64], SuperLU | None]:
-        """The vertices that a rim (v,) bool leaves free, and the factorized laplacian over them."""
+        """The vertices that a rim leaves free, and the factorized laplacian over them."""
         inner = np.flatnonzero(~rim)
         free = len(inner) > 0 and bool(rim.any())
         return inner, factorize(self.laplacian[inner][:, inner]) if free else None
 
     def factor(self, rim: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(v,) log scale u of the conformal map that keeps the lengths along a rim (v,) bool."""
+        """(v,) log scale u of the conformal map that keeps the lengths along a rim."""
         inner, solver = self.inside(rim)
         u = np.zeros(len(self.turn))
         if solver is not None:
             u[inner] = solver.solve(self.turn[inner] - 2.0 * np.pi)
         return u
+
+    def product(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(v,) the laplacian's product with u (v,)."""
+        return self.laplacian @ u
+
+    def harmonic(self, rim: NDArray[np.bool_], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (v, 2): as given on the rim, and inside it where the laplacian is zero."""
+        inner, solver = self.inside(rim)
+        found = values.copy()
+        if solver is not None:
+            found[inner] = solver.solve(-(self.laplacian[inner][:, rim] @ values[rim]))
+        return found
+
+
+class Compiled(Curvature):
+    """The same by the kernel."""
+
+    def __init__(self, surface: Surface, config: CotangentConfig) -> None:
+        super().__init__(surface, config)
+        compiled = kernel()
+        assert compiled is not None
+        self._conformal = compiled.Conformal(surface.vertices, surface.faces, config.least_weight, config.steepest)
+
+    def __reduce__(self) -> tuple[type[Compiled], tuple[Surface, CotangentConfig]]:
+        return Compiled, (self.surface, self.config)
+
+    @cached_property
+    def turn(self) -> NDArray[np.float64]:
+        """As above."""
+        return self._conformal.turn()
+
+    @cached_property
+    def fan(self) -> NDArray[np.int64]:
+        """As above."""
+        return self._conformal.fan()
+
+    def factor(self, rim: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """As above."""
+        return self._conformal.factor(rim)
+
+    def product(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """As above."""
+        return self._conformal.product(u)
+
+    def harmonic(self, rim: NDArray[np.bool_], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """As above."""
+        columns = [self._conformal.harmonic(rim, np.ascontiguousarray(column)) for column in values.T]
+        return np.stack(columns, axis=1)
 
 
 def corner_cotangents(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,17 +163,11 @@ def border_first(surface: Surface, loop: NDArray[np.int64], config: CotangentCon
     border = np.zeros(len(surface.vertices), dtype=bool)
     border[loop] = True
     curvature = Curvature.of(surface, config)
-    inner, solver = curvature.inside(border)
-    u = np.zeros(len(surface.vertices))
-    if solver is not None:
-        u[inner] = solver.solve(curvature.turn[inner] - 2.0 * np.pi)
-    bend = np.pi - curvature.turn[loop] + (curvature.laplacian @ u)[loop]
+    bend = np.pi - curvature.turn[loop] + curvature.product(curvature.factor(border))[loop]
     points = surface.vertices[loop]
     uv = np.zeros((len(surface.vertices), 2))
     uv[loop] = closed_polygon(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1), bend)
-    if solver is not None:
-        uv[inner] = solver.solve(-(curvature.laplacian[inner][:, loop] @ uv[loop]))
-    return uv
+    return curvature.harmonic(border, uv)
 
 
 def closed_polygon(length: NDArray[np.float64], bend: NDArray[np.float64]) -> NDArray[np.float64]:

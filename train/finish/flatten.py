@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 from ...runtime.geometry import triangles
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import boundary_loops
+from ...runtime.kernel.choice import kernel
 from ...runtime.mesh import Surface
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ CONFORMAL = igl.MappingEnergyType.CONFORMAL
 
 
 class Slim:
-    """SLIM (Rabinovich et al. 2017) on one piece, free boundary; libigl does the work."""
+    """SLIM (Rabinovich et al. 2017) on one piece, free boundary; the kernel does the work, or libigl, its twin."""
 
     def __init__(
         self,
@@ -88,6 +89,12 @@ class Slim:
     ) -> None:
         """``uv`` (v, 2) without flips: SLIM keeps it so.  Pinned vertices are drawn to their places, not forced."""
         pins = pins or Pins(np.zeros(0, dtype=np.int64), np.zeros((0, 2)), 0.0)
+        compiled = kernel() if energy == ISOMETRIC else None
+        self._compiled = compiled.Slim(surface.vertices, surface.faces, uv) if compiled else None
+        if self._compiled is not None:
+            for vertex, (x, y) in zip(pins.vertex.tolist(), pins.place.tolist(), strict=True):
+                self._compiled.pin(vertex, x, y, pins.weight)
+            return
         self._data = igl.slim_precompute(
             np.asfortranarray(surface.vertices),
             np.asfortranarray(surface.faces.astype(np.int32)),
@@ -100,6 +107,8 @@ class Slim:
 
     def run(self, iterations: int) -> NDArray[np.float64]:
         """Uv (v, 2) after so many more iterations."""
+        if self._compiled is not None:
+            return self._compiled.run(iterations)
         return np.ascontiguousarray(igl.slim_solve(self._data, iterations))
 
 

@@ -1,0 +1,174 @@
+// The compiled kernel as a Python module.  Arrays in, arrays out; Python's lock is released while anything is computed.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include "conformal.hpp"
+#include "exact.hpp"
+#include "slim.hpp"
+#include "topology.hpp"
+
+namespace py = pybind11;
+using namespace flexpara;
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+using Numbers = Array<double>;
+using Indices = Array<Index>;
+using Mask = Array<bool>;
+
+static Points3 points_of(const Numbers& array) {
+    Points3 points(array.shape(0));
+    if (array.size()) std::copy_n(array.data(), array.size(), points[0].data());
+    return points;
+}
+
+static Faces faces_of(const Indices& array) {
+    Faces faces(array.shape(0));
+    if (array.size()) std::copy_n(array.data(), array.size(), faces[0].data());
+    return faces;
+}
+
+// values as an array of rows of so many; 0 for one dimension.
+template <class T, class Source>
+static py::array_t<T> array_of(const Source* values, std::size_t count, py::ssize_t row = 0) {
+    std::vector<py::ssize_t> shape{py::ssize_t(count)};
+    if (row) shape = {py::ssize_t(count) / row, row};
+    py::array_t<T> array(shape);
+    std::copy_n(values, count, array.mutable_data());
+    return array;
+}
+
+template <class T>
+static py::array_t<T> array_of(const std::vector<T>& values, py::ssize_t row = 0) {
+    return array_of<T>(values.data(), values.size(), row);
+}
+
+static py::array_t<Index> pairs_of(const std::vector<std::array<Index, 2>>& pairs) {
+    return array_of<Index>(pairs.empty() ? nullptr : pairs[0].data(), 2 * pairs.size(), 2);
+}
+
+static void define_pieces(py::module_& module) {
+    py::class_<Slim>(module, "Slim")
+        .def(py::init([](const Numbers& points, const Indices& faces, const Numbers& uv) {
+            auto vertices = points_of(points);
+            auto corners = faces_of(faces);
+            std::vector<double> start(uv.data(), uv.data() + uv.size());
+            py::gil_scoped_release free;
+            return Slim(vertices, corners, std::move(start));
+        }))
+        .def("pin", &Slim::pin)
+        .def("run", [](Slim& slim, int iterations) {
+            {
+                py::gil_scoped_release free;
+                slim.run(iterations);
+            }
+            return array_of(slim.uv(), 2);
+        });
+    module.def("excess_energy", [](const Numbers& points, const Indices& faces, const Numbers& uv, double most) {
+        return excess_energy(points_of(points), faces_of(faces), uv.data(), most);
+    });
+    py::class_<Conformal>(module, "Conformal")
+        .def(py::init([](const Numbers& points, const Indices& faces, double least, double steepest) {
+            return Conformal(points_of(points), faces.data(), faces.shape(0), least, steepest);
+        }))
+        .def("turn", [](const Conformal& of) { return array_of(of.turn()); })
+        .def("fan", [](const Conformal& of) { return array_of(of.fan()); })
+        .def("factor", [](Conformal& of, const Mask& rim) {
+            std::vector<double> found;
+            {
+                py::gil_scoped_release free;
+                found = of.factor(rim.data());
+            }
+            return array_of(found);
+        })
+        .def("product", [](const Conformal& of, const Numbers& u) { return array_of(of.product(u.data())); })
+        .def("harmonic", [](Conformal& of, const Mask& rim, const Numbers& values) {
+            auto found = array_of<double>(values.data(), values.size());
+            of.harmonic(rim.data(), found.mutable_data());
+            return found;
+        });
+}
+
+static void define_overlap(py::module_& module) {
+    // (f, 3, 2) → (p, 2), sorted; None where a coordinate is out of range.
+    module.def("overlapping_pairs", [](const Numbers& uv) -> py::object {
+        std::vector<std::array<Index, 2>> found;
+        try {
+            py::gil_scoped_release free;
+            Overlaps(uv.data(), uv.shape(0)).each([&](Index a, Index b) {
+                found.push_back({a, b});
+                return true;
+            });
+            std::sort(found.begin(), found.end());
+        } catch (const OutOfRange&) {
+            return py::none();
+        }
+        return pairs_of(found);
+    });
+    module.def("overlaps_anywhere", [](const Numbers& uv) -> py::object {
+        bool any = false;
+        try {
+            py::gil_scoped_release free;
+            Overlaps(uv.data(), uv.shape(0)).each([&](Index, Index) { return !(any = true); });
+        } catch (const OutOfRange&) {
+            return py::none();
+        }
+        return py::bool_(any);
+    });
+    module.def("orientation_sign", [](const Numbers& a, const Numbers& b, const Numbers& c) -> py::object {
+        py::array_t<std::int8_t> sign(a.shape(0));
+        auto at = [](const Numbers& of, py::ssize_t i) { return Point{of.data()[2 * i], of.data()[2 * i + 1]}; };
+        try {
+            for (const auto* of : {&a, &b, &c}) check_range(of->data(), of->size());
+        } catch (const OutOfRange&) {
+            return py::none();
+        }
+        for (py::ssize_t i = 0; i < a.shape(0); ++i)
+            sign.mutable_data()[i] = std::int8_t(orientation(at(a, i), at(b, i), at(c, i)));
+        return sign;
+    });
+}
+
+static void define_topology(py::module_& module) {
+    module.def("edge_table", [](const Indices& faces) {
+        EdgeTable table;
+        {
+            py::gil_scoped_release free;
+            table = edge_table(faces.data(), faces.shape(0));
+        }
+        return py::make_tuple(pairs_of(table.edges), array_of(table.face_edges, 3), pairs_of(table.edge_faces),
+                              pairs_of(table.edge_halfedges), array_of(table.edge_count),
+                              array_of<bool>(table.manifold.data(), table.manifold.size()));
+    });
+    module.def("opened", [](const Indices& faces, const Indices& halfedges, const Mask& joined) {
+        Opened found;
+        {
+            py::gil_scoped_release free;
+            found = opened(faces.data(), faces.shape(0), halfedges.data(), joined.data(), joined.size());
+        }
+        return py::make_tuple(array_of(found.faces, 3), array_of(found.old));
+    });
+    module.def("boundary_loops", [](const Indices& faces) {
+        py::list loops;
+        for (const auto& loop : boundary_loops(faces.data(), faces.shape(0))) loops.append(array_of(loop));
+        return loops;
+    });
+    module.def("boundary_edges", [](const Indices& faces) {
+        std::vector<std::array<Index, 2>> found;
+        for (Index half : boundary_halfedges(edge_table(faces.data(), faces.shape(0))))
+            found.push_back({faces.data()[half], faces.data()[next_halfedge(half)]});
+        return pairs_of(found);
+    });
+    module.def("face_components", [](Index count, const Indices& pairs) {
+        Sets sets(count);
+        for (py::ssize_t i = 0; i < pairs.shape(0); ++i) sets.join(pairs.data()[2 * i], pairs.data()[2 * i + 1]);
+        return array_of(numbered(sets, count));
+    });
+}
+
+PYBIND11_MODULE(compiled, module) {
+    module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
+    define_pieces(module);
+    define_overlap(module);
+    define_topology(module);
+}
