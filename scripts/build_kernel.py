@@ -1,6 +1,7 @@
 """How the kernel in C++ is compiled: by pip, or in place by `python scripts/build_kernel.py`.
 
-The second needs `pip install pybind11 cmeel-eigen`, which pip does by itself for the first.  Without a compiler pip installs all the same, and Python does the kernel's work.
+The second needs `pip install pybind11 cmeel-eigen`, which pip does by itself for the first.  Without a
+compiler pip installs all the same, and Python does the kernel's work.
 """
 
 from __future__ import annotations

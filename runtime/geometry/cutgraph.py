@@ -13,6 +13,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
+from ..kernel.choice import kernel
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -67,6 +69,8 @@ def shortest_paths(
     count: int, edges: NDArray[np.int64], cost: NDArray[np.float64], sources: NDArray[np.int64]
 ) -> ShortestPaths:
     """Dijkstra along edges (e, 2) with positive costs (e,) from the nearest of ``sources``, over ``count`` vertices."""
+    if compiled := kernel():
+        return ShortestPaths(*compiled.shortest_paths(count, edges, cost, sources))
     graph = sparse.csr_array((cost, (edges[:, 0], edges[:, 1])), shape=(count, count))
     distance, parent, _ = dijkstra(graph, directed=False, indices=sources, min_only=True, return_predecessors=True)
     return ShortestPaths(distance, np.where(parent < 0, -1, parent).astype(np.int64))

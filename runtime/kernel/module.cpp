@@ -4,6 +4,7 @@
 
 #include "conformal.hpp"
 #include "exact.hpp"
+#include "paths.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
 
@@ -163,6 +164,14 @@ static void define_topology(py::module_& module) {
         Sets sets(count);
         for (py::ssize_t i = 0; i < pairs.shape(0); ++i) sets.join(pairs.data()[2 * i], pairs.data()[2 * i + 1]);
         return array_of(numbered(sets, count));
+    });
+    module.def("shortest_paths", [](Index count, const Indices& edges, const Numbers& cost, const Indices& sources) {
+        Paths found;
+        {
+            py::gil_scoped_release free;
+            found = shortest_paths(count, edges.data(), cost.data(), cost.size(), sources.data(), sources.size());
+        }
+        return py::make_tuple(array_of(found.distance), array_of(found.parent));
     });
 }
 

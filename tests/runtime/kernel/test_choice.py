@@ -30,7 +30,8 @@ def test_within_twins_only_nothing_compiled_is_used() -> None:
 
 def test_the_switch_turns_the_kernel_off() -> None:
     code = "from flexpara.runtime.kernel.choice import kernel; print(kernel())"
-    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, SWITCH: "off"}, capture_output=True, check=True)
+    off = {**os.environ, SWITCH: "off"}
+    done = subprocess.run([sys.executable, "-c", code], env=off, capture_output=True, check=True)
     assert done.stdout.split() == [b"None"]
 
 

@@ -7,6 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from flexpara.runtime.geometry.cutgraph import shortest_paths
 from flexpara.runtime.geometry.topology import (
     boundary_loops,
     components,
@@ -72,3 +73,16 @@ def test_loops_and_components_are_equal(faces: np.ndarray) -> None:
         assert np.array_equal(parts, components(faces))
         assert np.array_equal(face_components(len(faces), pairs), face_components(len(faces), pairs))
     assert np.array_equal(face_components(3, np.array([[2, 1]])), [0, 1, 1])
+
+
+def test_shortest_paths_are_equal(faces: np.ndarray) -> None:
+    edges, count = edge_table(faces).edges, int(faces.max(initial=0)) + 1
+    cost = np.random.default_rng(2).random(len(edges)) + 0.1
+    for sources in (np.array([0]), np.unique(faces)[::5]):
+        if len(edges) == 0:
+            continue
+        found = shortest_paths(count, edges, cost, sources)
+        with twins_only():
+            expected = shortest_paths(count, edges, cost, sources)
+        assert found.distance == pytest.approx(expected.distance, abs=1e-12)
+        assert np.array_equal(found.parent, expected.parent)
