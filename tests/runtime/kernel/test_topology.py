@@ -40,7 +40,7 @@ MESHES = {
 }
 
 
-@pytest.fixture(params=MESHES.values(), ids=MESHES.keys())
+@pytest.fixture(params=MESHES.values(), ids=list(MESHES))
 def faces(request: pytest.FixtureRequest) -> np.ndarray:
     return request.param.astype(np.int64)
 

@@ -36,7 +36,7 @@ def cap(name: str, share: float) -> Surface:
 PIECES = {"triangle": TRIANGLE, "flat cap": cap("sphere", 0.2), "deep cap": cap("sphere", 0.7)}
 
 
-@pytest.fixture(params=PIECES.values(), ids=PIECES.keys())
+@pytest.fixture(params=PIECES.values(), ids=list(PIECES))
 def piece(request: pytest.FixtureRequest) -> Surface:
     return request.param
 
