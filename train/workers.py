@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ..runtime.cores import core_count
 from ..runtime.errors import FinishError
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 def available_cores() -> int:
     """Cores for this process; 1 where it can't be forked safely (other systems than Linux)."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+    return core_count() if sys.platform == "linux" else 1
 
 
 def ticket_pipe(count: int) -> int:

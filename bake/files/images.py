@@ -6,7 +6,6 @@ PNG carries no colour chunk (glTF ignores them, other readers disagree about the
 
 from __future__ import annotations
 
-import os
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...runtime.cores import core_count
 from ...runtime.errors import FlexparaError, InputError, MissingDependencyError
 from ..colors.color import srgb_bytes_from_linear, srgb_from_linear
 
@@ -116,7 +116,7 @@ def quantize(texture: Texture, *, bits: Bits | None = None) -> NDArray[np.uint8]
         rows = slice(start, start + BAND)
         levels[rows] = _levels(pixels[rows], texture.encoding, depth, dither=texture.dither)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(core_count()) as pool:
         list(pool.map(fill, range(0, len(pixels), BAND)))  # list: waits, and raises what was raised
     return levels
 

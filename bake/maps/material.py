@@ -6,7 +6,6 @@ What a file holds as factors alone becomes a constant; faces take the textures o
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.cores import core_count
 from ...runtime.material import Material, used_materials
 from .resample import FootprintSampler, SourceTexture, linear_colors, texel_axes
 from .tangents import mikk_tangents
@@ -80,7 +80,7 @@ class SourceSlot:
                 values = self.values(gbuffer, texels[chosen], int(index))
                 result[texels[chosen]] = shade(self.materials[int(index)], values, texels[chosen])
 
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
+        with ThreadPoolExecutor(core_count()) as pool:
             list(pool.map(fill, gbuffer.chunks()))  # list: waits, and raises what was raised
         return result.reshape(height, width, channels)
 

@@ -10,7 +10,6 @@ cosine to n (Shirley and Morley 2003).  It is not of unit length.
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from ...runtime.cores import core_count
 from ...runtime.errors import InputError, MissingDependencyError
 from ...runtime.mesh import Frame
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 BATCH = 1 << 18
 """Rays handed over at once: about 7 MB, which is what stays in caches."""
-WORKERS = min(max(os.cpu_count() or 1, 2), 8)
+MOST_WORKERS = 8
 """Threads that make rays while Embree traces those of the others."""
 MOST_RAYS = 4096
 TILE = 8
@@ -204,7 +204,7 @@ def in_batches(
 ) -> None:
     """Call work with every piece of at most `size` texels, several at once; stops early when one of them raises."""
     pieces = [texels[start : start + size] for start in range(0, len(texels), size)]
-    pool = ThreadPoolExecutor(WORKERS, initializer=_mark)
+    pool = ThreadPoolExecutor(min(core_count(), MOST_WORKERS), initializer=_mark)
     try:
         done = 0
         for piece, _ in zip(pieces, pool.map(work, pieces), strict=True):

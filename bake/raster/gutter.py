@@ -7,7 +7,6 @@ image, with a halo as wide as the radius, gives what the whole image gives.
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from ...runtime.cores import core_count
 from ...runtime.errors import InputError
 from .background import NearestCells
 
@@ -106,7 +106,7 @@ def fill_gutters(
             part.fill(image[first:last], background)
             image[row + top, column] = image[np.divmod(source, width)]
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(core_count()) as pool:
         list(pool.map(fill, range(0, height, band)))  # list: waits, and raises what was raised
 
 

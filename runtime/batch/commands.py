@@ -15,7 +15,9 @@ from ..options.batch import BatchOptions
 from ..options.unwrap import Options, Outputs
 
 if TYPE_CHECKING:
+    from .driver import Crew
     from .manifest import Entry
+    from .pool import Limits
 
 WORK = "flexpara.__main__:unwrap_one"
 """What a worker does with a job; named, not imported, as all that unwraps lies above this folder."""
@@ -63,10 +65,11 @@ def work_off(
     """Do what is left to do; the exit code: 0 where all is done, 2 where something failed, 130 where interrupted."""
     from ... import __version__
     from ..files import replace_file
-    from .driver import Driver, Limits, shares_of_cores
+    from .driver import Driver
     from .jobs import find_jobs, shard
     from .lock import locked
     from .manifest import left_to_do, read_entries
+    from .pool import Limits
     from .status import PLAN, status_of, write_page
 
     first, count = batch.share
@@ -88,11 +91,21 @@ def work_off(
             said = f"{entry.metrics.get('charts')} charts" if entry.status == "done" else f"failed: {entry.error}"
             console.note(f"{entry.asset}: {said}, {entry.seconds:.1f} s")
 
-        driver = Driver(manifest, __version__, WORK, limits, told)
-        whole = not left or driver.run(left, shares_of_cores(batch.workers))
+        whole = not left or Driver(manifest, __version__, limits, told).run(left, crew_of(batch, limits, len(left)))
         write_page(output, status_of(output))
     if not whole:
         console.note("interrupted: what was running is given back; the same command goes on")
         return INTERRUPTED
     last = read_entries(manifest)
     return 2 if any(last[job.name].status == "failed" for job in jobs if job.name in last) else 0
+
+
+def crew_of(batch: BatchOptions, limits: Limits, jobs: int) -> Crew:
+    """Those who do the work: processes here, no more than there are jobs, or a cluster."""
+    if batch.ray is None:
+        from .crew import LocalCrew, shares_of_cores
+
+        return LocalCrew(WORK, shares_of_cores(batch.workers)[:jobs], limits)
+    from .fleet import Fleet
+
+    return Fleet(WORK, limits, batch.ray, None if batch.workers == "auto" else int(batch.workers))

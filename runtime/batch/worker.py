@@ -33,9 +33,10 @@ NETWORK = ("rms_texels", "chart_agreement")
 def main(parent: str, work: str, cores: str) -> None:
     """Answer jobs until standard input ends.
 
-    parent: number of the process that this one ends with.  work: MODULE:FUNCTION of a run.  cores: comma-separated.
+    parent: number of the process that this one ends with.  work: MODULE:FUNCTION of a run.  cores: comma-separated,
+    or none for any.
     """
-    if hasattr(os, "sched_setaffinity"):
+    if cores and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core) for core in cores.split(",")})
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # but while charts are searched, when it asks for what there is
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")

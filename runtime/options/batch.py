@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from .unwrap import demand
 from .words import Flag
 
+RAY = re.compile(r"local|(ray://)?[\w.-]+:\d{1,5}")
 UNITS = {"": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9}
 
 
@@ -18,6 +19,9 @@ class BatchOptions:
 
     workers: str = "auto"
     """Worker processes, each with cores of its own; auto is one for each core."""
+    ray: str | None = None
+    """Work on the machines of a Ray cluster: HOST:PORT of its head, or local for one on this machine.  Its machines see
+    the same folders, and have the same flexpara; needs flexpara[fleet]."""
     shard: str | None = None
     """Which of several equal shares of the assets this machine takes, as 3/16: the third of sixteen."""
     per_asset_seconds: float | None = None
@@ -33,6 +37,10 @@ class BatchOptions:
     def __post_init__(self) -> None:
         fits = self.workers == "auto" or (self.workers.isdigit() and int(self.workers) >= 1)
         demand(fits, f"workers is {self.workers!r}, expected auto or a number from 1; pass for instance --workers 2")
+        found = f"ray is {self.ray!r}, expected local or HOST:PORT"
+        demand(self.ray is None or RAY.fullmatch(self.ray) is not None, f"{found}; pass for instance --ray local")
+        found = f"workers is {self.workers} beside ray {self.ray}, expected auto"
+        demand(self.ray in (None, "local") or self.workers == "auto", f"{found}, as the cluster knows; leave it out")
         first, count = self.share
         found = f"shard is {self.shard!r}, expected N/M with N from 1 to M"
         demand(1 <= first <= count, f"{found}; pass for instance --shard 3/16")

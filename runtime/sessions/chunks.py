@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
+from ..cores import core_count
 from ..errors import BundleError, InputError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def checked_chunk(chunk: int) -> int:
 def checked_threads(threads: int | None) -> int:
     """Threads to use, one a core by default.  Raises: InputError below 1."""
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return core_count()
     if threads < 1:
         raise InputError(f"threads = {threads}, expected at least 1; leave it out for the default")
     return threads

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from flexpara.runtime.batch.driver import Driver, Limits, shares_of_cores
+from flexpara.runtime.batch.crew import LocalCrew, shares_of_cores
+from flexpara.runtime.batch.driver import Driver
 from flexpara.runtime.batch.jobs import Job, find_jobs
 from flexpara.runtime.batch.lock import locked
 from flexpara.runtime.batch.manifest import Entry, left_to_do, read_entries
+from flexpara.runtime.batch.pool import Limits
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.options.unwrap import Options, Outputs
 
@@ -76,7 +78,8 @@ def jobs_in(folder: Path, *names: str) -> list[Job]:
 def worked(jobs: list[Job], folder: Path, works: str, limits: Limits = NO_LIMITS) -> dict[str, Entry]:
     (folder / "out").mkdir(exist_ok=True)
     manifest = folder / "out" / "manifest.jsonl"
-    assert Driver(manifest, "1", works, limits, lambda _entry: None).run(jobs, [[0], [0]])
+    crew = LocalCrew(works, [[0], [0]], limits)
+    assert Driver(manifest, "1", limits, lambda _entry: None).run(jobs, crew)
     return read_entries(manifest)
 
 
@@ -142,7 +145,8 @@ def test_interrupts_give_back_what_is_running(interrupts: int, most: float, tmp_
 
     before = signal.getsignal(signal.SIGINT)
     threading.Thread(target=interrupt, daemon=True).start()
-    whole = Driver(manifest, "1", works, Limits(), lambda _entry: None).run(jobs, [[0], [0]])
+    crew = LocalCrew(works, [[0], [0]], Limits())
+    whole = Driver(manifest, "1", Limits(), lambda _entry: None).run(jobs, crew)
     assert not whole
     assert time.monotonic() - at[0] < most
     assert list(read_entries(manifest)) == ["a.obj"]

@@ -1,27 +1,39 @@
 """Whatever is killed, and whenever: the same command run again ends with the bytes of a run that nobody disturbed.
 
-Nightly, 200 kills: ``FLEXPARA_KILLS=100 pytest tests/runtime/batch/test_faults.py -k killed``.
+Nightly, 200 kills of each kind: ``FLEXPARA_KILLS=200 pytest tests/runtime/batch/test_faults.py -k killed``; a slice of
+them: ``FLEXPARA_KILLS=100:150``.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import secrets
 import signal
+import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import pytest
 
 from flexpara.runtime.samples import make_sample
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 KEPT = ("manifest.jsonl", "index.html", ".batch.lock")
 """What every run leaves beside its results."""
-KILLS = int(os.environ.get("FLEXPARA_KILLS", "1"))
-"""Moments at which a worker, and a driver, is killed; each moment is another."""
+FIRST, _, LAST = os.environ.get("FLEXPARA_KILLS", "1").rpartition(":")
+KILLS = range(int(FIRST or 0), int(LAST))
+"""Moments at which a worker, a driver, and a machine is killed; each moment is another."""
 KINDS = ("sphere", "bracket", "torus")
 
 
@@ -35,11 +47,12 @@ def meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def begun(meshes: Path, output: Path, *more: str) -> subprocess.Popen[str]:
+def begun(meshes: Path, output: Path, *more: str, environment: dict[str, str] | None = None) -> subprocess.Popen[str]:
     """A batch at work."""
     words = ["batch", str(meshes), "-o", str(output), "--maps", "none", "--size", "256", *more]
     command = [sys.executable, "-m", "flexpara", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    environment = {**os.environ, **(environment or {})}
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
 
 
 def ended(run: subprocess.Popen[str]) -> tuple[int, str]:
@@ -85,7 +98,7 @@ def test_each_asset_has_the_bytes_of_a_single_run(meshes: Path, undisturbed: dic
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="workers are found in /proc")
-@pytest.mark.parametrize("seed", range(KILLS))
+@pytest.mark.parametrize("seed", KILLS)
 def test_a_killed_worker_costs_nothing_but_time(
     meshes: Path, undisturbed: dict[str, object], tmp_path: Path, seed: int
 ) -> None:
@@ -99,7 +112,7 @@ def test_a_killed_worker_costs_nothing_but_time(
     assert content(tmp_path) == undisturbed
 
 
-@pytest.mark.parametrize("seed", range(KILLS))
+@pytest.mark.parametrize("seed", KILLS)
 def test_a_killed_driver_leaves_what_the_next_run_completes(
     meshes: Path, undisturbed: dict[str, object], tmp_path: Path, seed: int
 ) -> None:
@@ -110,6 +123,117 @@ def test_a_killed_driver_leaves_what_the_next_run_completes(
         run.kill()
         ended(run)
     code, said = ended(begun(meshes, tmp_path))
+    assert code == 0, said
+    assert content(tmp_path) == undisturbed
+
+
+MACHINE = "FLEXPARA_TEST_MACHINE"
+"""Variable that all processes of one machine of a cluster have."""
+TOKEN = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
+"""Variables without which nobody gives jobs to a cluster of these tests."""
+needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is absent (pip install ray)")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What `ray start` started.
+
+    mark: in the environment of its processes; some of Ray's overwrite theirs, but stay in its session.
+    """
+
+    mark: bytes
+    session: int
+
+    def processes(self) -> list[int]:
+        """All that run on it."""
+        return [
+            number
+            for number in process_numbers()
+            if self.mark in told_of(number, "environ") or self.session == session_of(number)
+        ]
+
+    def works(self) -> bool:
+        """Whether it works on a job."""
+        return any(b"batch.worker" in told_of(number, "cmdline") for number in self.processes())
+
+    def kill(self) -> None:
+        """As when it loses its power."""
+        while found := self.processes():
+            for number in found:
+                with suppress(ProcessLookupError):
+                    os.kill(number, signal.SIGKILL)
+            time.sleep(0.02)
+
+
+class Cluster:
+    """Machines of a Ray cluster, all of them on this one: what `ray start` starts, each with a core."""
+
+    def __init__(self, folder: str) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.address, self.name = f"127.0.0.1:{port}", Path(folder).name
+        self.machines: list[Machine] = []
+        self.start("--head", "--port", str(port), "--temp-dir", folder, "--include-dashboard", "false")
+
+    def start(self, *words: str) -> Machine:
+        """One more machine."""
+        name = f"{self.name}-{len(self.machines)}."
+        size = ["--num-cpus", "1", "--object-store-memory", "80000000", "--disable-usage-stats"]
+        command = [sys.executable, "-m", "ray.scripts.scripts", "start", *size, *words]
+        marked = {**os.environ, **TOKEN, MACHINE: name}
+        with subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=marked, start_new_session=True
+        ) as run:
+            assert run.wait(120) == 0
+        self.machines.append(Machine(f"{MACHINE}={name}".encode(), run.pid))
+        return self.machines[-1]
+
+
+def process_numbers() -> list[int]:
+    """All processes of this machine, but those that ended and are not yet waited for."""
+    return [int(path.name) for path in Path("/proc").glob("[0-9]*") if told_of(int(path.name), "cmdline")]
+
+
+def told_of(number: int, what: str) -> bytes:
+    """What the system tells of a process; nothing where that has ended."""
+    try:
+        return Path(f"/proc/{number}/{what}").read_bytes()
+    except OSError:
+        return b""
+
+
+def session_of(number: int) -> int:
+    """The session of a process; 0 where it has ended."""
+    with suppress(ProcessLookupError):
+        return os.getsid(number)
+    return 0
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    with TemporaryDirectory(prefix="flexpara-ray-", ignore_cleanup_errors=True) as folder:  # short: it holds sockets
+        cluster = Cluster(folder)
+        yield cluster
+        for machine in cluster.machines:
+            machine.kill()
+
+
+@needs_ray
+@pytest.mark.xdist_group("ray")
+@pytest.mark.skipif(sys.platform != "linux", reason="machines are found in /proc")
+@pytest.mark.parametrize("seed", KILLS)
+def test_a_killed_machine_costs_nothing_but_time(
+    meshes: Path, undisturbed: dict[str, object], cluster: Cluster, tmp_path: Path, seed: int
+) -> None:
+    machine = cluster.start("--address", cluster.address)
+    run = begun(meshes, tmp_path, "--ray", cluster.address, environment=TOKEN)
+    while not machine.works():
+        assert run.poll() is None, "the batch ended before the machine had a job"
+        time.sleep(0.02)
+    time.sleep(Random(seed).uniform(0.0, 2.0))
+    machine.kill()
+    code, said = ended(run)
     assert code == 0, said
     assert content(tmp_path) == undisturbed
 
