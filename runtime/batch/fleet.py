@@ -7,9 +7,11 @@ all machines see the same folders.
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
 import socket
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlexparaError, InputError
@@ -61,13 +63,13 @@ class Fleet:
         for name, value in (SETTINGS | (own_token() if address == "local" else {})).items():
             os.environ.setdefault(name, value)
         with requires("fleet"):
-            import ray
+            ray: Any = import_module("ray")
         self.ray, self.work, self.limits = ray, work, limits
         if address != "local":
             knock(address)
         where: dict[str, Any] = {"num_cpus": cores, "include_dashboard": False} if address == "local" else {}
         try:
-            ray.init(None if address == "local" else address, **where, log_to_driver=False, logging_level="ERROR")
+            ray.init(None if address == "local" else address, **where, log_to_driver=False, logging_level=logging.ERROR)
         except (ray.exceptions.RayError, ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
             found = f"no Ray cluster answers at {address} ({' '.join(str(error).split())[:200]})"
             raise InputError(
