@@ -32,7 +32,8 @@ DOCS = ROOT / "docs"
 PAGES = sorted([ROOT / "README.md", ROOT / "integrations" / "blender" / "README.md", *DOCS.rglob("*.md")])
 BLOCK = re.compile(r"^( *)```(\w+)[^\n]*\n(.*?)^\1```", re.MULTILINE | re.DOTALL)
 NOT_RUN = {"pip", "git", "cd", "zip", "scripts/demo", "scripts/docs", ".", "apt-get"}
-SHOWN = {"cpp", "rust", "js", "csharp", "mermaid", "text"}
+SHOWN = {"cpp", "rust", "js", "html", "csharp", "mermaid", "text"}
+"""Not run here; test_docs_languages runs those of the first four that it can."""
 SIZED = ("unwrap", "bake", "pack")
 SIZE = "64"
 

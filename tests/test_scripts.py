@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 ROOT = Path(__file__).resolve().parent.parent
-SHELL = ("scripts/demo", "scripts/test", "scripts/environment.sh")
+SHELL = ("scripts/demo", "scripts/test", "scripts/environment.sh", "scripts/onnx-headers")
 
 
 def normalized(requirement: str) -> str:
@@ -40,7 +40,7 @@ def test_scripts_parse_as_posix_shell(name: str) -> None:
     subprocess.run(["sh", "-n", str(ROOT / name)], check=True)
 
 
-@pytest.mark.parametrize("name", ["scripts/demo", "scripts/test", ".ci/run"])
+@pytest.mark.parametrize("name", ["scripts/demo", "scripts/test", "scripts/onnx-headers", ".ci/run"])
 def test_scripts_can_be_run(name: str) -> None:
     assert (ROOT / name).stat().st_mode & 0o111
 
