@@ -2,12 +2,12 @@
 """flexpara in Blender: unwrap, repack, evaluate and bake from the UV menu, the work done by a process beside Blender.
 
 `exchange` (arrays and files) and `child` (the process) know nothing of Blender; `meshes` reads and writes its data,
-`operators` are the commands, `interface` is what one sees of them.
+`settings` is what can be asked, `operators` are the commands, `interface` is what one sees of them.
 """
 
-from . import interface, operators
+from . import interface, operators, settings
 
-CLASSES = (*operators.CLASSES, *interface.CLASSES)
+CLASSES = (*settings.CLASSES, *operators.CLASSES, *interface.CLASSES)
 
 
 def register() -> None:
@@ -16,6 +16,7 @@ def register() -> None:
 
     for entry in CLASSES:
         bpy.utils.register_class(entry)
+    settings.add()
     interface.add_menus()
 
 
@@ -24,5 +25,6 @@ def unregister() -> None:
     import bpy
 
     interface.remove_menus()
+    settings.remove()
     for entry in reversed(CLASSES):
         bpy.utils.unregister_class(entry)

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import child, operators
+from . import child, operators, settings
 
 SHOWN = {
     "charts": "Charts",
@@ -17,7 +17,6 @@ SHOWN = {
     "overlap_fraction": "Overlap",
     "packing_efficiency": "Use of the square",
 }
-ENTRIES = operators.CLASSES[:4]
 
 
 class FlexparaPreferences(bpy.types.AddonPreferences):
@@ -51,11 +50,21 @@ class Sidebar:
     bl_region_type, bl_category, bl_label = "UI", "flexpara", "flexpara"
 
     def draw(self, context: Any) -> None:
-        """The commands, and what was measured last."""
-        for entry in ENTRIES:
-            self.layout.operator(entry.bl_idname)
+        """What can be asked, the commands, and what was measured last."""
+        asked = settings.settings_of(context)
+        column = self.layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        for name in settings.NAMES:
+            column.prop(asked, name)
+        for entry in operators.COMMANDS:
+            settings.handed_over(asked, self.layout.operator(entry.bl_idname))
         measured = context.scene.get("flexpara")
-        for key, label in SHOWN.items() if measured is not None else ():
+        if measured is None:
+            return
+        row = self.layout.row(align=True)
+        for shown, label, _ in (*operators.OVERLAYS, ("none", "None", "")):
+            row.operator(operators.FLEXPARA_OT_show.bl_idname, text=label).shown = shown
+        for key, label in SHOWN.items():
             if key in measured:
                 self.layout.label(text=f"{label}: {measured[key]:.4g}")
 
@@ -76,7 +85,7 @@ def draw_menu(menu: Any, context: Any) -> None:
     """The commands in a UV menu."""
     del context
     menu.layout.separator()
-    for entry in ENTRIES:
+    for entry in operators.COMMANDS:
         menu.layout.operator(entry.bl_idname)
 
 

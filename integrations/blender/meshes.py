@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 UV_NAME = "UVMap"
-CHARTS, DISTORTION = "flexpara charts", "flexpara distortion"
-"""Colours and attributes that the overlays show."""
+CHARTS, DISTORTION, SEAMS = "flexpara charts", "flexpara distortion", "flexpara seams"
+"""Attributes that the overlays show: of faces, of faces, of edges; the first two have colours besides."""
 HEAT_TOP = 1.2
 """Distortion at which the colour is deepest."""
 
@@ -83,11 +83,29 @@ def write_uv(entry: Chosen, uv: NDArray[np.float32], answered: NDArray[np.bool_]
     values[loops[answered]] = uv[answered]
     layer.uv.foreach_set("vector", values.reshape(-1))
     if mark_seams:
-        loop_edge = column(data.loops, "edge_index", np.int32)[loops]
-        seams = column(data.edges, "use_seam", bool)
-        seams[loop_edge] = False
-        seams[exchange.seam_edges(entry.mesh, loop_edge, uv)] = True
-        data.edges.foreach_set("use_seam", seams)
+        mark(entry, uv)
+    data.update()
+
+
+def mark(entry: Chosen, uv: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Blender's seams of the chosen polygons: the edges at which their uv (l, 2) part, which are returned."""
+    data = entry.thing.data
+    loop_edge = column(data.loops, "edge_index", np.int32)[entry.loops]
+    seams = column(data.edges, "use_seam", bool)
+    seams[loop_edge] = False
+    found = exchange.seam_edges(entry.mesh, loop_edge, uv)
+    seams[found] = True
+    data.edges.foreach_set("use_seam", seams)
+    return found
+
+
+def show_seams(entry: Chosen) -> None:
+    """The edges at which the uv of the chosen polygons part, as Blender's seams and as an attribute."""
+    data = entry.thing.data
+    there = np.zeros(len(data.edges), bool)
+    if entry.mesh.uv is not None:
+        there[mark(entry, entry.mesh.uv.astype(np.float32))] = True
+    replaced(data.attributes, SEAMS, "BOOLEAN", "EDGE").data.foreach_set("value", there)
     data.update()
 
 
@@ -124,3 +142,11 @@ def heat_colors(distortion: NDArray[np.float64]) -> NDArray[np.float32]:
     """(p, 3) white where a polygon keeps its shape, red where it is distorted."""
     share = np.clip((distortion - 1.0) / (HEAT_TOP - 1.0), 0.0, 1.0)[:, None]
     return (np.array([0.93, 0.93, 0.93]) * (1.0 - share) + np.array([0.72, 0.0, 0.05]) * share).astype(np.float32)
+
+
+def show_colors(things: list[Any], name: str) -> None:
+    """Make a colour the one that the viewport draws, on each mesh that has it."""
+    for thing in things:
+        colors = thing.data.color_attributes
+        if name in colors:
+            colors.active_color = colors[name]

@@ -14,9 +14,11 @@ import bpy
 import numpy as np
 
 from . import child, exchange, meshes
+from .settings import UnwrapSettings
 
 TICK = 0.1
 """Seconds between two looks at the process."""
+OVERLAYS = [(meshes.DISTORTION, "Distortion", "Red is distorted"), (meshes.CHARTS, "Charts", "A colour each")]
 
 
 class InProcess:
@@ -124,32 +126,11 @@ class InProcess:
             self.report({"WARNING"}, f"{left} corners of faces without area kept their uv")
 
 
-class FLEXPARA_OT_unwrap(InProcess, bpy.types.Operator):
+class FLEXPARA_OT_unwrap(InProcess, UnwrapSettings, bpy.types.Operator):
     """Unwrap the selected meshes into one atlas of few charts with little distortion."""
 
     bl_idname, bl_label = "flexpara.unwrap", "Unwrap with flexpara"
     with_uv = False
-    charts: bpy.props.IntProperty(
-        name="Charts", default=8, min=1, max=1000, description="The most charts of each connected part"
-    )
-    max_stretch: bpy.props.FloatProperty(
-        name="Max Stretch",
-        default=0.0,
-        min=0.0,
-        max=2.0,
-        precision=3,
-        description="Mean stretch a part may have, 1 is none, for the shortest seams that keep it; 0: both are weighed",
-    )
-    time_budget: bpy.props.FloatProperty(
-        name="Seconds", default=0.0, min=0.0, description="Time for the search of charts; 0 is no limit"
-    )
-    size: bpy.props.IntProperty(name="Size", default=2048, min=16, max=16384, description="Texels of the atlas' side")
-    padding: bpy.props.IntProperty(name="Padding", default=8, min=0, description="Free texels around each chart")
-    seed: bpy.props.IntProperty(name="Seed", default=0, min=0)
-    selected_only: bpy.props.BoolProperty(
-        name="Selected Faces", default=False, description="In edit mode, the selected faces only"
-    )
-    mark_seams: bpy.props.BoolProperty(name="Mark Seams", default=True, description="Seams become Blender's seams")
 
     def words(self, folder: Path) -> list[str]:
         numbers = {"charts": self.charts, "size": self.size, "padding": self.padding, "seed": self.seed}
@@ -194,12 +175,12 @@ class FLEXPARA_OT_repack(InProcess, bpy.types.Operator):
 
 
 class FLEXPARA_OT_evaluate(InProcess, bpy.types.Operator):
-    """Measure the uv of the selected meshes, and show charts and distortion as colour attributes."""
+    """Measure the uv of the selected meshes, and show charts and distortion as colours; seams become Blender's."""
 
     bl_idname, bl_label = "flexpara.evaluate", "Evaluate UV"
-    shown: bpy.props.EnumProperty(
-        name="Show",
-        items=[(meshes.DISTORTION, "Distortion", "Red is distorted"), (meshes.CHARTS, "Charts", "A colour each")],
+    shown: bpy.props.EnumProperty(name="Show", items=OVERLAYS)
+    mark_seams: bpy.props.BoolProperty(
+        name="Mark Seams", default=True, description="Mark the edges at which the uv part, which edit mode draws"
     )
 
     def words(self, folder: Path) -> list[str]:
@@ -215,9 +196,31 @@ class FLEXPARA_OT_evaluate(InProcess, bpy.types.Operator):
         charts_of, worst_of = (meshes.split(values, self.chosen, loops=False) for values in (chart, worst))
         for entry, own, distorted in zip(self.chosen, charts_of, worst_of, strict=True):
             meshes.show_faces(entry, own, distorted)
-            colors = entry.thing.data.color_attributes
-            colors.active_color = colors[f"{self.shown} color"]
+            if self.mark_seams:
+                meshes.show_seams(entry)
+        show(bpy.context, [entry.thing for entry in self.chosen], self.shown)
         bpy.context.scene["flexpara"] = {name: value for name, value in json.loads(said).items() if value is not None}
+
+
+class FLEXPARA_OT_show(bpy.types.Operator):
+    """Show another overlay of what was evaluated last."""
+
+    bl_idname, bl_label, bl_options = "flexpara.show", "Show", {"REGISTER", "UNDO"}  # noqa: RUF012
+    shown: bpy.props.EnumProperty(name="Show", items=[*OVERLAYS, ("none", "None", "Materials again")])
+
+    def execute(self, context: Any) -> set[str]:
+        """At once."""
+        show(context, meshes.things(context), self.shown)
+        return {"FINISHED"}
+
+
+def show(context: Any, things: list[Any], shown: str) -> None:
+    """One overlay in all 3D views of the screen, or "none"."""
+    meshes.show_colors(things, f"{shown} color")
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D":
+            area.spaces.active.shading.color_type = "MATERIAL" if shown == "none" else "VERTEX"
+            area.spaces.active.overlay.show_edge_seams = True
 
 
 class FLEXPARA_OT_bake(InProcess, bpy.types.Operator):
@@ -293,4 +296,6 @@ def environment() -> Path:
     return Path(bpy.utils.extension_path_user(__package__, path="environment", create=True))
 
 
-CLASSES = (FLEXPARA_OT_unwrap, FLEXPARA_OT_repack, FLEXPARA_OT_evaluate, FLEXPARA_OT_bake, FLEXPARA_OT_install)
+COMMANDS = (FLEXPARA_OT_unwrap, FLEXPARA_OT_repack, FLEXPARA_OT_evaluate, FLEXPARA_OT_bake)
+"""Those of the menus."""
+CLASSES = (*COMMANDS, FLEXPARA_OT_show, FLEXPARA_OT_install)

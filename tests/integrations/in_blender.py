@@ -202,8 +202,73 @@ def evaluate_and_bake() -> None:
     attribute = thing.data.attributes["flexpara distortion"]
     assert abs(max(entry.value for entry in attribute.data) - 1.0) < 1e-5
     assert thing.data.color_attributes.active_color.name == "flexpara distortion color"
+    assert bpy.ops.flexpara.show(shown="flexpara charts") == {"FINISHED"}
+    assert thing.data.color_attributes.active_color.name == "flexpara charts color"
     assert bpy.ops.flexpara.bake(maps="normal,uv-checker", size=64) == {"FINISHED"}
     assert len([image for image in bpy.data.images if image.packed_file and image.size[0] == 64]) == 2
+
+
+def overlays() -> None:
+    """Two charts of a cube, one of them stretched: colours, numbers and seams say which."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    layer, top = thing.data.uv_layers.active, max(thing.data.polygons, key=lambda face: face.center.z).index
+    for face in thing.data.polygons:
+        for corner, loop in enumerate(face.loop_indices):
+            square = ((0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1))[corner]
+            wide = 4.0 if face.index == top else 1.0
+            layer.uv[loop].vector = (square[0] * wide + 0.5 * (face.index % 2), square[1] + 0.2 * (face.index // 2))
+    assert bpy.ops.flexpara.evaluate(shown="flexpara charts") == {"FINISHED"}
+    assert len({entry.value for entry in thing.data.attributes["flexpara charts"].data}) == 6
+    worst = [entry.value for entry in thing.data.attributes["flexpara distortion"].data]
+    assert max(range(6), key=worst.__getitem__) == top
+    assert [entry.value for entry in thing.data.attributes["flexpara seams"].data] == [True] * 12
+    assert all(edge.use_seam for edge in thing.data.edges)
+    heat = thing.data.color_attributes["flexpara distortion color"].data
+    red = [heat[loop].color_srgb[0] - heat[loop].color_srgb[1] for loop in range(24)]
+    on_top = [loop // 4 == top for loop in range(24)]
+    assert min(np.compress(on_top, red)) > max(np.compress(np.logical_not(on_top), red))
+    charts = thing.data.color_attributes["flexpara charts color"].data
+    assert len({tuple(np.round(charts[loop].color_srgb, 2)) for loop in range(24)}) == 6
+
+
+def sidebar(extension: Any) -> list[str]:
+    """What is drawn: fields and buttons that stand for the settings of the scene and the commands."""
+    bpy.context.scene.flexpara_settings.charts = 3
+    lines: list[str] = []
+
+    class Layout:
+        """A layout that writes down what is drawn."""
+
+        def prop(self, owner: Any, name: str) -> None:
+            lines.append(f"{owner.bl_rna.properties[name].name}: {getattr(owner, name):g}")
+
+        def operator(self, name: str, text: str = "") -> Any:
+            room, _, own = name.partition(".")
+            kind = getattr(getattr(bpy.ops, room), own).get_rna_type()
+            lines.append(f"[{text or kind.name}]")
+            asked.append(type("Asked", (), dict.fromkeys(kind.properties.keys())))
+            return asked[-1]
+
+        def label(self, text: str) -> None:
+            lines.append(text)
+
+        def column(self) -> Any:
+            return self
+
+        def row(self, align: bool) -> Any:
+            assert align
+            return self
+
+    asked: list[Any] = []
+    panel = type("Panel", (extension.interface.Sidebar,), {"layout": Layout()})()
+    panel.draw(bpy.context)
+    assert "Charts: 3" in lines
+    assert "[Unwrap with flexpara]" in lines
+    assert asked[0].charts == 3
+    assert any(line.startswith("Seam length: ") for line in lines), lines
+    return lines
 
 
 class Window:
@@ -306,11 +371,13 @@ def main(folder: str, program: str) -> None:
     seconds = suzanne()
     for check in (modifiers, several, selected_faces, evaluate_and_bake):
         check()
+    overlays()
+    lines = sidebar(extension)
     in_background(extension.operators)
     failures()
     extension.unregister()
     assert not hasattr(bpy.types, "FLEXPARA_OT_unwrap")
-    sys.stdout.write(json.dumps({"blender": bpy.app.version_string, "seconds": seconds}) + "\n")
+    sys.stdout.write(json.dumps({"blender": bpy.app.version_string, "seconds": seconds, "sidebar": lines}) + "\n")
     sys.stdout.flush()
     os._exit(0)  # bpy 4.2 may crash while it is taken down
 
