@@ -205,7 +205,7 @@ class FLEXPARA_OT_evaluate(InProcess, bpy.types.Operator):
 class FLEXPARA_OT_show(bpy.types.Operator):
     """Show another overlay of what was evaluated last."""
 
-    bl_idname, bl_label, bl_options = "flexpara.show", "Show", {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_idname, bl_label, bl_options = "flexpara.show", "Show", {"REGISTER", "UNDO"}
     shown: bpy.props.EnumProperty(name="Show", items=[*OVERLAYS, ("none", "None", "Materials again")])
 
     def execute(self, context: Any) -> set[str]:
