@@ -26,7 +26,8 @@ from ..runtime.progress import Stages
 from ..train.charts.charts import Finished, chart_surface
 from ..train.charts.recut import recut
 from ..train.config import FinishConfig
-from ..train.finish.fallback import unwrapped_by_xatlas
+from ..train.finish.config import ProjectConfig
+from ..train.finish.projected import projected
 from ..train.pipeline import as_charts
 
 if TYPE_CHECKING:
@@ -116,14 +117,14 @@ def surface_part(
 
 
 def charted(surface: Surface, charts: int, seed: int, deadline: Deadline) -> Charts:
-    """Charts of a welded surface, in its units; those of xatlas where our own were refused, which is logged."""
+    """Charts of a welded surface, in its units; projections where our own were refused, which is logged."""
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     try:
         finished = chart_surface(ball, charts, FinishConfig(), seed, Stages(deadline=deadline))
     except FinishError as error:
-        LOG.warning("charts by xatlas: %s", error)
-        pieces = unwrapped_by_xatlas(ball, np.arange(len(ball.faces)), float(ball.face_areas().sum()))
+        LOG.warning("charts by projection: %s", error)
+        pieces = projected(ball, np.arange(len(ball.faces)), float(ball.face_areas().sum()), ProjectConfig())
         finished = Finished(pieces, math.inf, {}, ())
     found = as_charts(ball, finished)
     return replace(found, corner_uv=found.corner_uv * frame.scale)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
 from .deploy.config import FitConfig, WrapConfig
-from .finish.config import FlapConfig, SlitConfig
+from .finish.config import FlapConfig, ProjectConfig, SlitConfig
 from .seams.config import ClosingConfig
 
 
@@ -149,6 +149,18 @@ class CarryConfig:
     """Length of a seam, as a multiple of its ends' distance, above which it is led along in parts."""
     rigid_steps: int = 4
     """Steps of as-rigid-as-possible flattening from the proxy's rotations."""
+    hurried_rounds: int = 8
+    """Rounds in which labels follow their neighbours, where there is no time to weigh borders."""
+
+
+@dataclass(frozen=True)
+class HurriedConfig:
+    """What is otherwise in `FineConfig`, once it is late: charts lose what folds instead of being laid out anew."""
+
+    steps: int = 1
+    contacts: int = 0
+    most_wrong: float = 0.3
+    most_off: float = 0.4
 
 
 @dataclass(frozen=True)
@@ -189,6 +201,8 @@ class FineConfig:
     """Residual, as a share of the right side, at which a solve ends."""
     solver_steps: int = 200
     """The most steps of conjugate gradients of a solve."""
+    hurried: HurriedConfig = field(default_factory=HurriedConfig)
+    """What holds instead, once it is late."""
 
 
 @dataclass(frozen=True)
@@ -251,6 +265,8 @@ class FinishConfig:
     """Parts of many faces."""
     haste: HasteConfig = field(default_factory=HasteConfig)
     """Time budgets."""
+    project: ProjectConfig = field(default_factory=ProjectConfig)
+    """Charts by projection, where time is out."""
     split: SplitConfig = field(default_factory=SplitConfig)
     """Where a chart may be cut in two."""
     foretold: float = 0.4

@@ -26,12 +26,14 @@ from ..finish.flaps import flap_faces, restricted
 from ..finish.flatten import Pins
 from ..finish.openings import openings, slit_along
 from ..finish.pieces import Piece, extract, measured, try_piece
+from ..finish.projected import projected
 from ..finish.slits import Flat
 from ..finish.twolevel import TwoLevel
 from ..search.labels import dual_graph
 from ..search.state import State
 from ..workers import parallel_map
 from .carry import fragments_joined, smoothed_in_band, votes
+from .hurried import crumbs_given, labels_at_once
 from .layout import carried_jacobians
 from .sides import faces_beside
 
@@ -49,16 +51,22 @@ def refined(
 ) -> list[Piece]:
     """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew.
 
-    Once it is ``late``, a valid layout may be worse than its source, and what has none gets charts of xatlas.
+    Once it is ``late``, borders are not weighed, a valid layout may be worse than its source, charts lose all that
+    folds, and what has no layout is projected.
     """
+    hurried = late()
     label = np.zeros(len(middle.faces), dtype=np.int64)
     for number, piece in enumerate(pieces):
         label[piece.ids] = number
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     areas = surface.face_areas()
-    smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
-    joined = fragments_joined(smooth, areas, graph, config.carry.islet)
-    groups = [np.flatnonzero(joined == number) for number in range(int(joined.max()) + 1)]
+    if hurried:
+        smooth = labels_at_once(middle, label, surface, graph, config.carry)
+        joined = crumbs_given(smooth, areas, graph, config.carry.islet)
+    else:
+        smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
+        joined = fragments_joined(smooth, areas, graph, config.carry.islet)
+    groups = np.split(np.argsort(joined, kind="stable"), np.cumsum(np.bincount(joined))[:-1])
     sources = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
     total = float(areas.sum())
@@ -68,9 +76,10 @@ def refined(
 
     found = parallel_map(laid, order)
     failed = [number for number, of_one in zip(order, found, strict=True) if not of_one]
-    if late():
-        found += parallel_map(lambda number: unwrapped_by_xatlas(surface, groups[number], total), failed)
-        return [piece for of_one in found for piece in of_one]
+    if late() and failed:
+        left = np.sort(np.concatenate([groups[number] for number in failed]))
+        found.append(projected(surface, left, total, config.project))
+        failed = []
     anew = State(surface, graph, config) if failed else None
     if anew is not None:
         anew.add_all_valid([(groups[number], sources[number].slits) for number in failed])
@@ -84,12 +93,14 @@ def refined_piece(
 
     It may be no worse than the source by more than the configured factor, unless it is ``late``.
     """
+    if late():
+        config = replace(config, fine=replace(config.fine, **vars(config.fine.hurried)))
     whole = extract(surface, ids)
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []
     for disk in opened_alike(whole, source, config):
         uv, wrong = laid_out(disk, source.flat, config)
-        found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config)
+        found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config, late)
         if found and (not best or total_cost(found, config) < total_cost(best, config)):
             best = found
         if best and (best[0].energy <= allowed or late()):
@@ -111,6 +122,7 @@ def without_folds(
     wrong: NDArray[np.bool_],
     total: float,
     config: FinishConfig,
+    late: Late = never,
 ) -> list[Piece]:
     """The piece, first, less the faces that fold or lie over others, and these, cut off, as others.
 
@@ -126,8 +138,9 @@ def without_folds(
         part = components(flat.surface.faces[~off])
         rows = np.flatnonzero(~off)[part == np.bincount(part).argmax()]
         rest = restricted(flat, rows)
-    off_ids = np.setdiff1d(np.arange(len(ids)), rows)
-    return [measured(surface, ids[rows], rest, total, ()), *flaps_apart(surface, ids[off_ids], total, config)]
+    off = ids[np.setdiff1d(np.arange(len(ids)), rows)]
+    flaps = projected(surface, off, total, config.project) if late() else flaps_apart(surface, off, total, config)
+    return [measured(surface, ids[rows], rest, total, ()), *flaps]
 
 
 def in_the_way(flat: Flat, config: FineConfig) -> NDArray[np.bool_]:

@@ -110,7 +110,7 @@ def chart_surface(
         for piece in solved[part.copy_of if part.copy_of >= 0 else number].pieces
     ]
     stage("exact check")
-    pieces = sorted(all_proven(surface, pieces), key=lambda piece: int(piece.ids.min()))
+    pieces = sorted(all_proven(surface, pieces, config.project, late), key=lambda piece: int(piece.ids.min()))
     stage.end()
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
@@ -156,7 +156,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
         return exact
     energy = sum(piece.energy for piece in pieces)
-    if energy > config.resort_excess:
+    if energy > config.resort_excess and not starts.late():
         resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
         if sum(piece.energy for piece in resort) < energy:
             return Solved(resort, "xatlas")

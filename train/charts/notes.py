@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -47,7 +48,9 @@ def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple
             f"{missed} of {len(solved)} different parts keep a mean "
             f"stretch of up to {1.0 + max(stretched):.3g}; a smaller --charts does not help, a cleaner mesh may"
         )
-    resort = sum(piece.resort != "" for part in solved.values() for piece in part.pieces)
-    if resort:
+    resorts = Counter(piece.resort for part in solved.values() for piece in part.pieces)
+    if resorts["projection"]:
+        found.append(f"{resorts['projection']} charts are projections, since there was no time to lay them out")
+    if resort := resorts["xatlas"]:
         found.append(f"{resort} charts were flattened by xatlas, where our own flattening found nothing valid")
     return tuple(found)

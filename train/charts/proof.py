@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ...runtime.deadline import Late, never
 from ...runtime.errors import FinishError
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ..finish.config import ProjectConfig
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.flaps import trimmed
 from ..finish.pieces import Overlapping
+from ..finish.projected import projected
 from ..workers import parallel_map
 
 if TYPE_CHECKING:
@@ -29,8 +32,12 @@ def verify(pieces: list[Piece]) -> None:
             )
 
 
-def all_proven(surface: Surface, pieces: list[Piece]) -> list[Piece]:
+def all_proven(
+    surface: Surface, pieces: list[Piece], config: ProjectConfig | None = None, late: Late = never
+) -> list[Piece]:
     """The pieces, each as it is where the exact check passes, else what ``proven`` makes of it.
+
+    Once it is ``late``, those that fail are projected, by the numbers of ``config``.
 
     Raises: FinishError where that is not valid either (a defect).
     """
@@ -38,6 +45,10 @@ def all_proven(surface: Surface, pieces: list[Piece]) -> list[Piece]:
     valid = dict(zip(order, parallel_map(lambda number: is_valid(pieces[number]), order), strict=True))
     found: list[Piece] = []
     for number, piece in enumerate(pieces):
+        if not valid[number] and late():
+            area = float(surface.face_areas().sum())
+            found += projected(surface, piece.ids, area, config or ProjectConfig())
+            continue
         parts = [piece] if valid[number] else proven(surface, piece)
         if not valid[number]:
             verify(parts)

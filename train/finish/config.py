@@ -98,3 +98,21 @@ class SlitConfig:
     """How a slit that folds over itself is held apart."""
     seams: SeamPrices = field(default_factory=SeamPrices)
     """What the ways that slits take cost."""
+
+
+@dataclass(frozen=True)
+class ProjectConfig:
+    """Charts by projection, where there is no time for a search."""
+
+    least: float = 0.3
+    """Cosine of the angle up to which a face may turn from the direction that it is seen from …"""
+    barely: float = 0.05
+    """… and in a crumb."""
+    crumb: int = 40
+    """Connected faces of one direction below which they are a crumb."""
+    rounds: int = 8
+    """Rings of faces that a face takes its direction from."""
+    votes: int = 4
+    """Rounds in which faces follow most of their neighbours."""
+    blocks: int = 64
+    """Pieces of work that charts are shared out in."""

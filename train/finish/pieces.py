@@ -37,7 +37,7 @@ class Piece:
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
     slit_length: of all cuts inside the piece, in √A.  slits: those made against stretch, in order.
-    resort: "xatlas" where all else failed.
+    resort: "xatlas" where all else failed, "projection" where time was out.
     """
 
     ids: NDArray[np.int64]
