@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
+from .carry.config import CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import FlapConfig, ProjectConfig, SlitConfig
 from .seams.config import ClosingConfig
@@ -127,92 +128,6 @@ class StartConfig:
     """Lloyd iterations."""
     certainty: float = 10.0
     """−log probability of a label per squared distance beyond the nearest cluster's."""
-
-
-@dataclass(frozen=True)
-class CarryConfig:
-    """From the proxy back to the surface."""
-
-    neighbours: int = 3
-    """Nearest faces of the proxy that vote for a face's label."""
-    normal_weight: float = 0.1
-    """Weight of the unit normal against the position, at area 1, in that distance."""
-    band: int = 4
-    """Rings of faces beside a border that may change sides."""
-    worse: float = 2.0
-    """Excess energy of a carried chart, as a multiple of the proxy's, up to which it is taken at once."""
-    slack: float = 0.005
-    """Mean excess energy added to that."""
-    islet: float = 0.001
-    """Share of a part below which a fragment of a label joins a neighbour."""
-    winding: float = 1.4
-    """Length of a seam, as a multiple of its ends' distance, above which it is led along in parts."""
-    rigid_steps: int = 4
-    """Steps of as-rigid-as-possible flattening from the proxy's rotations."""
-    hurried_rounds: int = 8
-    """Rounds in which labels follow their neighbours, where there is no time to weigh borders."""
-
-
-@dataclass(frozen=True)
-class HurriedConfig:
-    """What is otherwise in `FineConfig`, once it is late: charts lose what folds instead of being laid out anew."""
-
-    steps: int = 1
-    contacts: int = 0
-    most_wrong: float = 0.3
-    most_off: float = 0.4
-
-
-@dataclass(frozen=True)
-class FineConfig:
-    """A part of many faces: thinned to a middle mesh for all but the last step, which carries its charts back."""
-
-    faces: int = 20000
-    """Faces of the middle mesh."""
-    above: float = 1.5
-    """Parts of more than so many times as many are thinned."""
-    early: int = 3
-    """The quick thinning ends at so many times the faces wanted; the careful one does the rest."""
-    haste: float = 3.0
-    """How fast the threshold of the quick thinning rises: 7 is its library's default, 0 the most careful."""
-    jitter: float = 0.03
-    """Standard deviation of its vertices' moves, as a share of the shortest edge at each."""
-    steps: int = 4
-    """Rigid steps after the first solve, which keeps the middle chart's own stretch."""
-    steepest: float = 2.0
-    """Stretch of a face of the middle mesh that is taken over; a sliver's may be anything."""
-    candidates: int = 8
-    """Near faces of the middle mesh that are looked at beside a slit."""
-    torn: float = 1.5
-    """How much farther apart in uv than in space two of them are where a slit runs between them."""
-    rings: int = 3
-    """Rings of faces around a flipped one that turn as those beside them."""
-    most_wrong: float = 5e-3
-    """Share of a chart's faces that may be flipped, or overlap along its border, and are cut off …"""
-    around: int = 1
-    """… with so many rings around what is flipped …"""
-    most_off: float = 0.02
-    """… as long as no larger share goes with them."""
-    contacts: int = 2
-    """Steps more, in which what came to overlap is held where it was …"""
-    hold: float = 1e3
-    """… by this weight against the distortion energy."""
-    tolerance: float = 1e-3
-    """Residual, as a share of the right side, at which a solve ends."""
-    solver_steps: int = 200
-    """The most steps of conjugate gradients of a solve."""
-    hurried: HurriedConfig = field(default_factory=HurriedConfig)
-    """What holds instead, once it is late."""
-
-
-@dataclass(frozen=True)
-class HasteConfig:
-    """What a time budget has to leave for all that follows the search."""
-
-    seconds: float = 1.0
-    """Of any surface …"""
-    seconds_per_face: float = 2e-5
-    """… and for each of its faces."""
 
 
 @dataclass(frozen=True)

@@ -280,7 +280,7 @@ def test_the_time_budget_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> Non
     assert late == [True, False]
 
 
-def test_charts_that_are_refused_are_those_of_xatlas_and_the_log_says_so(
+def test_charts_that_are_refused_are_projections_and_the_log_says_so(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def refuse(*_: object) -> None:
@@ -288,7 +288,7 @@ def test_charts_that_are_refused_are_those_of_xatlas_and_the_log_says_so(
 
     monkeypatch.setattr(dropin, "chart_surface", lambda *_, **__: refuse())
     unwrapped(xatlas.parametrize(BOX.vertices, BOX.faces), BOX.vertices, BOX.faces)
-    assert "charts by xatlas: no valid charts" in caplog.text
+    assert "charts by projection: no valid charts" in caplog.text
 
 
 def test_the_number_of_charts_can_be_set() -> None:

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
     from ..config import FineConfig, FinishConfig
     from ..finish.arap import Solve
+    from ..search.labels import DualGraph
 
 
 def refined(
@@ -51,25 +52,13 @@ def refined(
 ) -> list[Piece]:
     """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew.
 
-    Once it is ``late``, borders are not weighed, a valid layout may be worse than its source, charts lose all that
-    folds, and what has no layout is projected.
+    Once it is ``late``, borders of many charts are not weighed, a valid layout may be worse than its source, charts
+    lose all that folds, and what has no layout is projected.
     """
-    hurried = late()
-    label = np.zeros(len(middle.faces), dtype=np.int64)
-    for number, piece in enumerate(pieces):
-        label[piece.ids] = number
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
-    areas = surface.face_areas()
-    if hurried:
-        smooth = labels_at_once(middle, label, surface, graph, config.carry)
-        joined = crumbs_given(smooth, areas, graph, config.carry.islet)
-    else:
-        smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
-        joined = fragments_joined(smooth, areas, graph, config.carry.islet)
-    groups = np.split(np.argsort(joined, kind="stable"), np.cumsum(np.bincount(joined))[:-1])
-    sources = [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
+    groups, sources = carried_groups(surface, graph, middle, pieces, config, late)
     order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
-    total = float(areas.sum())
+    total = float(surface.face_areas().sum())
 
     def laid(number: int) -> list[Piece]:
         return refined_piece(surface, groups[number], sources[number], total, config, late)
@@ -86,6 +75,24 @@ def refined(
     return [piece for of_one in found for piece in of_one] + ([] if anew is None else list(anew.pieces.values()))
 
 
+def carried_groups(
+    surface: Surface, graph: DualGraph, middle: Surface, pieces: list[Piece], config: FinishConfig, late: Late
+) -> tuple[list[NDArray[np.int64]], list[Piece]]:
+    """Connected faces of the surface, group by group, and the piece of the middle mesh that each is laid out like."""
+    label = np.zeros(len(middle.faces), dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        label[piece.ids] = number
+    areas = surface.face_areas()
+    if late() and len(surface.faces) * len(pieces) > config.fine.hurried.weighed:
+        smooth = labels_at_once(middle, label, surface, graph, config.carry)
+        joined = crumbs_given(smooth, areas, graph, config.carry.islet)
+    else:
+        smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
+        joined = fragments_joined(smooth, areas, graph, config.carry.islet)
+    groups = np.split(np.argsort(joined, kind="stable"), np.cumsum(np.bincount(joined))[:-1])
+    return groups, [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
+
+
 def refined_piece(
     surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig, late: Late = never
 ) -> list[Piece]:
@@ -94,7 +101,7 @@ def refined_piece(
     It may be no worse than the source by more than the configured factor, unless it is ``late``.
     """
     if late():
-        config = replace(config, fine=replace(config.fine, **vars(config.fine.hurried)))
+        config = replace(config, fine=config.fine.in_a_hurry())
     whole = extract(surface, ids)
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []

@@ -116,12 +116,12 @@ def test_late_a_layout_worse_than_its_source_is_kept(
         refined(surface, middle, halves(middle), demanding)
 
 
-def test_late_what_can_not_be_laid_out_gets_charts_of_xatlas(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_late_what_can_not_be_laid_out_is_projected(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = unit("sphere", 64)
     middle = thinned(surface, MIDDLE)
     monkeypatch.setattr(fine, "refined_piece", lambda *_: [])
     found = refined(surface, middle, halves(middle), CONFIG, lambda: True)
-    assert {piece.method for piece in found} == {"xatlas"}
+    assert {piece.method for piece in found} == {"projection"}
     assert np.array_equal(np.sort(np.concatenate([piece.ids for piece in found])), np.arange(len(surface.faces)))
 
 

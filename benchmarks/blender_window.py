@@ -1,0 +1,122 @@
+"""Pictures of the extension in Blender's window: `blender --python benchmarks/blender_window.py -- PROGRAM MESH.obj OUT`.
+
+Runs inside the full program, with a display (Xvfb will do, drawn in software); PROGRAM is flexpara.  MESH is unwrapped
+and evaluated by the extension's own commands, and OUT receives `blender-sidebar.png` and `blender-heat.png`.  Blender
+before 3.5 has another name for the uv of loops, which is put right here and nowhere else: the extension is for 4.2.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Any
+
+bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
+EXTENSION = Path(__file__).resolve().parents[1] / "integrations" / "blender"
+TAB = "flexpara"
+WAIT = 1.0
+"""Seconds between two steps, in which Blender draws."""
+
+
+class Rows:
+    """The uv of a layer of Blender before 3.5, under the name that it has since."""
+
+    def __init__(self, data: Any) -> None:
+        self.data = data
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def foreach_get(self, _name: str, values: Any) -> None:
+        """Read them."""
+        self.data.foreach_get("uv", values)
+
+    def foreach_set(self, _name: str, values: Any) -> None:
+        """Write them."""
+        self.data.foreach_set("uv", values)
+
+
+def enabled(program: str) -> None:
+    """The extension, which finds this program."""
+    sys.path.insert(0, str(EXTENSION.parent))
+    if bpy.app.version < (3, 5, 0):
+        bpy.types.MeshUVLoopLayer.uv = property(lambda layer: Rows(layer.data))
+    extension = importlib.import_module(EXTENSION.name)
+    for panel in (extension.interface.FLEXPARA_PT_image, extension.interface.FLEXPARA_PT_view):
+        panel.bl_order = 0
+    extension.register()
+    extension.child.find = lambda preferred="": program or preferred
+
+
+def arranged(mesh: str) -> None:
+    """The mesh alone, in edit mode, in the workspace for uv, with both sidebars open."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    bpy.ops.wm.obj_import(filepath=mesh)
+    bpy.context.window.workspace = bpy.data.workspaces["UV Editing"]
+
+
+def opened() -> None:
+    """Sidebars at our tab, the mesh in the middle of the view."""
+    bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    for area in bpy.context.screen.areas:
+        if area.type in ("IMAGE_EDITOR", "VIEW_3D"):
+            area.spaces.active.show_region_ui = True
+    framed()
+
+
+def framed() -> None:
+    """What is selected fills both views."""
+    ways = {"VIEW_3D": lambda: bpy.ops.view3d.view_selected(), "IMAGE_EDITOR": lambda: bpy.ops.image.view_all()}
+    for area in bpy.context.screen.areas:
+        if area.type in ways:
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with bpy.context.temp_override(area=area, region=region):
+                ways[area.type]()
+
+
+def tabs_chosen() -> None:
+    """Our tab in both sidebars: it is the last, where others are closed."""
+    for area in bpy.context.screen.areas:
+        for region in area.regions if area.type in ("IMAGE_EDITOR", "VIEW_3D") else ():
+            if region.type == "UI" and hasattr(region, "active_panel_category"):
+                try:
+                    region.active_panel_category = TAB
+                except AttributeError:  # read-only before 4.2
+                    pass
+
+
+def shot(path: Path) -> None:
+    """The whole window as a picture."""
+    bpy.ops.screen.screenshot(filepath=str(path))
+
+
+def main(program: str, mesh: str, out: str) -> None:
+    """One step after the other; Blender draws between them."""
+    steps = [
+        lambda: enabled(program),
+        lambda: arranged(mesh),
+        lambda: bpy.ops.object.mode_set(mode="OBJECT"),
+        lambda: bpy.ops.flexpara.unwrap(charts=8, size=1024),
+        lambda: bpy.ops.flexpara.evaluate(shown="flexpara charts"),
+        opened,
+        framed,
+        tabs_chosen,
+        lambda: shot(Path(out) / "blender-sidebar.png"),
+        lambda: (bpy.ops.object.mode_set(mode="OBJECT"), bpy.ops.flexpara.show(shown="flexpara distortion")),
+        lambda: shot(Path(out) / "blender-heat.png"),
+        bpy.ops.wm.quit_blender,
+    ]
+
+    def step() -> float | None:
+        steps.pop(0)()
+        return WAIT if steps else None
+
+    bpy.app.timers.register(step, first_interval=WAIT)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[sys.argv.index("--") + 1 :])
