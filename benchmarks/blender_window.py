@@ -1,7 +1,7 @@
-"""Pictures of the extension in Blender's window: `blender --python benchmarks/blender_window.py -- PROGRAM MESH.obj OUT`.
+"""Pictures of the extension in Blender's window: `blender --enable-event-simulate --python SCRIPT -- PROGRAM MESH OUT`.
 
-Runs inside the full program, with a display (Xvfb will do, drawn in software); PROGRAM is flexpara.  MESH is unwrapped
-and evaluated by the extension's own commands, and OUT receives `blender-sidebar.png` and `blender-heat.png`.  Blender
+SCRIPT is this file.  It runs inside the full program, on a display of 1600 × 1000 (Xvfb will do, drawn in software);
+PROGRAM is flexpara.  MESH, an OBJ file, is unwrapped and evaluated by the extension's own commands, and OUT receives `blender-sidebar.png` and `blender-heat.png`.  Blender
 before 3.5 has another name for the uv of loops, which is put right here and nowhere else: the extension is for 4.2.
 """
 
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import importlib
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
 EXTENSION = Path(__file__).resolve().parents[1] / "integrations" / "blender"
-TAB = "flexpara"
+TAB_BELOW = 173
+"""Pixels from the top of a sidebar to the middle of its fourth tab."""
 WAIT = 1.0
 """Seconds between two steps, in which Blender draws."""
 
@@ -78,15 +80,13 @@ def framed() -> None:
                 ways[area.type]()
 
 
-def tabs_chosen() -> None:
-    """Our tab in both sidebars: it is the last, where others are closed."""
-    for area in bpy.context.screen.areas:
-        for region in area.regions if area.type in ("IMAGE_EDITOR", "VIEW_3D") else ():
-            if region.type == "UI" and hasattr(region, "active_panel_category"):
-                try:
-                    region.active_panel_category = TAB
-                except AttributeError:  # read-only before 4.2
-                    pass
+def tab_chosen(kind: str, value: str) -> None:
+    """A click on our tab in a sidebar, which no property chooses before Blender 4.2; value: PRESS or RELEASE."""
+    area = next(area for area in bpy.context.screen.areas if area.type == kind)
+    region = next(region for region in area.regions if region.type == "UI")
+    place = {"x": region.x + region.width - 10, "y": region.y + region.height - TAB_BELOW}
+    bpy.context.window.event_simulate(type="MOUSEMOVE", value="NOTHING", **place)
+    bpy.context.window.event_simulate(type="LEFTMOUSE", value=value, **place)
 
 
 def shot(path: Path) -> None:
@@ -104,7 +104,7 @@ def main(program: str, mesh: str, out: str) -> None:
         lambda: bpy.ops.flexpara.evaluate(shown="flexpara charts"),
         opened,
         framed,
-        tabs_chosen,
+        *(partial(tab_chosen, kind, value) for kind in ("IMAGE_EDITOR", "VIEW_3D") for value in ("PRESS", "RELEASE")),
         lambda: shot(Path(out) / "blender-sidebar.png"),
         lambda: (bpy.ops.object.mode_set(mode="OBJECT"), bpy.ops.flexpara.show(shown="flexpara distortion")),
         lambda: shot(Path(out) / "blender-heat.png"),
