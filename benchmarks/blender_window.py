@@ -1,8 +1,9 @@
 """Pictures of the extension in Blender's window: `blender --enable-event-simulate --python SCRIPT -- PROGRAM MESH OUT`.
 
 SCRIPT is this file.  It runs inside the full program, on a display of 1600 × 1000 (Xvfb will do, drawn in software);
-PROGRAM is flexpara.  MESH, an OBJ file, is unwrapped and evaluated by the extension's own commands, and OUT receives `blender-sidebar.png` and `blender-heat.png`.  Blender
-before 3.5 has another name for the uv of loops, which is put right here and nowhere else: the extension is for 4.2.
+PROGRAM is flexpara.  MESH, an OBJ file, is unwrapped and evaluated by the extension's own commands, and OUT receives
+`blender-sidebar.png` and `blender-heat.png`.  Blender before 3.5 has another name for the uv of loops, which is put
+right here and nowhere else: the extension is for 4.2.
 """
 
 from __future__ import annotations

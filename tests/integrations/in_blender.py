@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
+window: Any = importlib.import_module("blender_window")  # beside this script
 
 
 def enabled(folder: Path, program: str) -> Any:
@@ -236,88 +237,14 @@ def overlays() -> None:
 def sidebar(extension: Any) -> list[str]:
     """What is drawn: fields and buttons that stand for the settings of the scene and the commands."""
     bpy.context.scene.flexpara_settings.charts = 3
-    lines: list[str] = []
-
-    class Layout:
-        """A layout that writes down what is drawn."""
-
-        def prop(self, owner: Any, name: str) -> None:
-            lines.append(f"{owner.bl_rna.properties[name].name}: {getattr(owner, name):g}")
-
-        def operator(self, name: str, text: str = "") -> Any:
-            room, _, own = name.partition(".")
-            kind = getattr(getattr(bpy.ops, room), own).get_rna_type()
-            lines.append(f"[{text or kind.name}]")
-            asked.append(type("Asked", (), dict.fromkeys(kind.properties.keys())))
-            return asked[-1]
-
-        def label(self, text: str) -> None:
-            lines.append(text)
-
-        def column(self) -> Any:
-            return self
-
-        def row(self, align: bool) -> Any:
-            assert align
-            return self
-
-    asked: list[Any] = []
-    panel = type("Panel", (extension.interface.Sidebar,), {"layout": Layout()})()
-    panel.draw(bpy.context)
+    layout = window.Layout()
+    type("Panel", (extension.interface.Sidebar,), {"layout": layout})().draw(bpy.context)
+    lines, asked = layout.lines, layout.asked
     assert "Charts: 3" in lines
     assert "[Unwrap with flexpara]" in lines
     assert asked[0].charts == 3
     assert any(line.startswith("Seam length: ") for line in lines), lines
     return lines
-
-
-class Window:
-    """Blender's window, as far as a command in the background speaks to it: what it was told."""
-
-    def __init__(self) -> None:
-        self.said: list[object] = []
-        self.shares: list[float] = []
-        self.window_manager = self.workspace = self
-        self.window = None
-
-    def __getattr__(self, name: str) -> Any:
-        """All else is Blender's own."""
-        return getattr(bpy.context, name)
-
-    def event_timer_add(self, _seconds: float, window: object) -> str:
-        """A timer."""
-        return f"timer of {window}"
-
-    def event_timer_remove(self, timer: object) -> None:
-        """No longer wanted."""
-        self.said.append(timer)
-
-    def progress_begin(self, low: float, high: float) -> None:
-        """The bar appears."""
-        self.shares += [low - high]
-
-    def progress_update(self, share: float) -> None:
-        """The bar grows."""
-        self.shares.append(share)
-
-    def progress_end(self) -> None:
-        """The bar is gone."""
-        self.said.append("bar gone")
-
-    def modal_handler_add(self, command: object) -> None:
-        """Events go to the command."""
-        self.said.append(type(command).__name__)
-
-    def status_text_set(self, text: str | None) -> None:
-        """The line at the bottom."""
-        self.said.append(text)
-
-
-class Event:
-    """A timer's tick, or a key."""
-
-    def __init__(self, kind: str, value: str = "NOTHING") -> None:
-        self.type, self.value = kind, value
 
 
 def in_background(operators: Any) -> None:
@@ -330,20 +257,20 @@ def in_background(operators: Any) -> None:
     settings |= {"selected_only": False, "mark_seams": True}
     methods = {name: getattr(kind, name) for name in ("words", "take", "with_uv")}
     told: list[Any] = []
-    command, window = type("Unwrap", (operators.InProcess,), methods | settings)(), Window()
+    command, shown = type("Unwrap", (operators.InProcess,), methods | settings)(), window.Window()
     command.report = lambda *words: told.append(words)
-    assert command.invoke(window, Event("MOUSEMOVE")) == {"RUNNING_MODAL"}
+    assert command.invoke(shown, window.Event("MOUSEMOVE")) == {"RUNNING_MODAL"}
     escaped = False
-    while (state := command.modal(window, Event("TIMER"))) == {"RUNNING_MODAL"}:
+    while (state := command.modal(shown, window.Event("TIMER"))) == {"RUNNING_MODAL"}:
         if not escaped and command.run.stage.name == "charts":
-            command.modal(window, Event("ESC", "PRESS"))
+            command.modal(shown, window.Event("ESC", "PRESS"))
             escaped = True
         time.sleep(0.02)
     assert (state, escaped) == ({"FINISHED"}, True), told
-    assert any("Esc again: stop at once" in str(text) for text in window.said)
-    assert window.said[-3:] == ["timer of None", "bar gone", None]
-    assert len(set(window.shares)) > 2
-    assert window.shares[1:] == sorted(window.shares[1:])
+    assert any("Esc again: stop at once" in str(text) for text in shown.said)
+    assert shown.said[-3:] == ["timer of None", "bar gone", None]
+    assert len(set(shown.shares)) > 2
+    assert shown.shares[1:] == sorted(shown.shares[1:])
     assert told[-1][0] == {"INFO"}
     assert np.ptp(uv_of(bpy.context.object), axis=0).min() > 0.3
 

@@ -66,8 +66,8 @@ def smoothed(part: Surface, pairs: NDArray[np.int64], config: ProjectConfig) -> 
         around /= np.maximum(np.linalg.norm(around, axis=1, keepdims=True), 1e-300)
     label = np.where(facing >= config.least, around @ directions().T, facing - 2.0).argmax(axis=1)
     for _ in range(config.votes):
-        votes = links @ sparse.csr_array((np.ones(count), (np.arange(count), label)), shape=(count, len(directions())))
-        votes = votes.toarray() + 0.5 * (np.arange(len(directions())) == label[:, None])  # among equals it stays
+        own = (np.arange(len(directions())) == label[:, None]).astype(np.float64)
+        votes = links @ own + 0.5 * own  # among equals it stays
         label = np.where(facing >= config.least, votes, facing - 2.0).argmax(axis=1)
     for _ in range(config.rounds):
         label = crumbs_joined(label, pairs, facing, config)
