@@ -13,6 +13,7 @@ import numpy as np
 
 from ..runtime.errors import InputError
 from ..runtime.options.keywords import from_keywords
+from .denoise import check_denoiser, denoised
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
@@ -60,7 +61,7 @@ def bake(
 
     Raises:
         InputError: an unknown map or keyword, a size or uv that cannot be drawn, a map that lacks its source.
-        MissingDependencyError: "opengl" is asked for and cannot be had.
+        MissingDependencyError: "opengl" or the denoiser is asked for and cannot be had.
     """
     if isinstance(asset, Mapping):
         if maps is not None:
@@ -75,6 +76,8 @@ def bake(
         return {}
     check_size(texels)
     check_padding(settings.padding)
+    if settings.denoise:
+        check_denoiser()
     tell = progress or (lambda _: None)
     drawn = [entry for entry in chosen if not entry.everywhere]
     pixels = draw_maps(Ground(atlas, asset), drawn, texels, settings, tell, warn) if drawn else {}
@@ -99,6 +102,10 @@ def draw_maps(
         pixels, covered, inside = put_together(baked, size, settings.scratch)
     images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in maps]
     fill_gutters(images, covered, settings.padding)
+    if settings.denoise and any(entry.estimated for entry in maps):
+        for entry in (entry for entry in maps if entry.estimated):
+            pixels[entry.name][covered] = denoised(entry, pixels[entry.name], covered)[covered]
+        fill_gutters(images, covered, settings.padding)
     if settings.padding != 0 and settings.tile is None:
         close_seams(ground.atlas, maps, pixels, inside)
     return pixels

@@ -86,6 +86,10 @@ def check_outputs(
         "files.gltf": meshes and bool({"glb", "gltf"} & set(outputs.formats)),
         "pictures.preview": outputs.preview,
     }
+    if outputs.denoise and maps:
+        from .denoise import check_denoiser
+
+        check_denoiser()
     with requires("bake"):
         for module in (name for name, needed in wanted.items() if needed):
             import_module(f".{module}", __package__)

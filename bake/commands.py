@@ -168,7 +168,8 @@ def _bake_squares(folder: OutputFolder, job: BakeJob, options: BakeOptions) -> d
     from .results.udim import bake_udim, write_udim
 
     gutter = gutter_of(job.atlas, job.outputs)
-    tiles = bake_udim(job.atlas, job.asset, list(job.maps), size=options.size, padding=gutter, samples=options.samples)
+    asked = {"size": options.size, "padding": gutter, "samples": options.samples, "denoise": options.denoise}
+    tiles = bake_udim(job.atlas, job.asset, list(job.maps), **asked)
     kind = options.texture_format
     folder.write_several(lambda path: write_udim(tiles, path, job.asset.stem, file_type=kind))
     return {"tiles": list(tiles)}

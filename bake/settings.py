@@ -23,6 +23,7 @@ class BakeSettings:
     device: "opengl", "software" (numpy: the same result, slower), or "auto": numpy where no OpenGL device answers.
     limit: the largest side drawn at once, in samples; None is what the device allows.
     tile: the UDIM tile (a, b) to draw, see udim.py; None is the unit square.
+    denoise: whether Open Image Denoise takes the noise out of maps that rays estimate.
     scratch: a folder on whose disk images are kept, in files without a name, instead of in memory: for 16k.
     """
 
@@ -33,4 +34,5 @@ class BakeSettings:
     device: Device = "auto"
     limit: int | None = None
     tile: tuple[int, int] | None = None
+    denoise: bool = False
     scratch: Path | None = None

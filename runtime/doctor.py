@@ -17,7 +17,7 @@ from .extras import PACKAGE
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-USER_EXTRAS = ("", "train", "bake", "samples", "formats")
+USER_EXTRAS = ("", "train", "bake", "samples", "formats", "denoise")
 INSTRUCTION_SETS = ("avx2", "fma", "avx512f", "avx512_bf16", "amx_bf16", "asimd", "bf16")
 
 

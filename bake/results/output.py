@@ -112,6 +112,7 @@ def bake_textures(output: OutputFolder, job: BakeJob, clock: Clock) -> Baked:
         list(job.maps),
         padding=gutter_of(job.atlas, job.outputs),
         samples=job.outputs.samples,
+        denoise=job.outputs.denoise,
         scratch=Path(tempfile.gettempdir()) if job.atlas.size >= LARGE else None,
         progress=lambda name: clock("bake", names.index(name), len(names)),
     )

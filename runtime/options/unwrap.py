@@ -214,6 +214,8 @@ class MapOptions:
     """Samples of each texel: 1, 4 or 16."""
     rays: int = 64
     """Rays of each sample, 1 to 4096, for the maps that are ray-traced."""
+    denoise: Flag = False
+    """Take the noise out of those maps by Open Image Denoise, which flexpara[denoise] brings."""
     layers: Flag = False
     """Write all maps as layers of one file, STEM.exr."""
     exr_bits: Literal[16, 32] = 32
