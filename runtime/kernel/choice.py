@@ -7,34 +7,49 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ..errors import MissingDependencyError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import ModuleType
 
+EDITION = 2
+"""Of the kernel's functions; one more wherever they change."""
 SWITCH = "FLEXPARA_KERNEL"
 """Environment variable: "off" for the twins."""
 
 
 def compiled() -> ModuleType | None:
-    """The compiled module, where the installation had a compiler."""
+    """The compiled module, where the installation had a compiler.
+
+    Raises: MissingDependencyError where it was compiled from other sources than these.
+    """
     try:
-        return import_module(".compiled", __package__)
+        module = import_module(".compiled", __package__)
     except ImportError:
         return None
+    found = getattr(module, "edition", 0)
+    if found != EDITION:
+        how = f"python scripts/build_kernel.py in the checkout, install flexpara again, or set {SWITCH}=off"
+        raise MissingDependencyError(f"the compiled kernel is of edition {found}, expected {EDITION}; {how}")
+    return module
 
 
-_chosen: list[Any] = [None if os.environ.get(SWITCH) == "off" else compiled()]
-"""The last one counts."""
+_chosen: list[Any] = []
+"""The last one counts; empty until the first time that it matters."""
 
 
 def kernel() -> Any | None:
     """The compiled module; None where the twins do the work."""
+    if not _chosen:
+        _chosen.append(None if os.environ.get(SWITCH) == "off" else compiled())
     return _chosen[-1]
 
 
 @contextmanager
 def twins_only() -> Iterator[None]:
     """Within this, the twins do the work."""
+    kernel()
     _chosen.append(None)
     try:
         yield

@@ -90,31 +90,41 @@ class Cholesky {
         }
     }
 
-    // x (n · B, one after the other) in place.
+    // x in place: n · B unknowns one after the other, each with so many columns.
+    template <int Columns = 1>
     void solve(double* x) const {
-        std::vector<double> y(std::size_t(n_) * B);
-        for (int i = 0; i < n_; ++i)
-            for (int c = 0; c < B; ++c) y[place_[i] * B + c] = x[i * B + c];
+        constexpr int width = B * Columns;
+        std::vector<double> y(std::size_t(n_) * width);
+        for (int i = 0; i < n_; ++i) std::copy_n(x + std::size_t(i) * width, width, &y[std::size_t(place_[i]) * width]);
         for (int i = 0; i < n_; ++i)
             for (int q = start_[i]; q < start_[i + 1]; ++q)
-                for (int r = 0; r < B; ++r)
-                    for (int c = 0; c < B; ++c) y[index_[q] * B + r] -= factor_[q][r * B + c] * y[i * B + c];
+                subtract<Columns>(&y[std::size_t(index_[q]) * width], factor_[q], &y[std::size_t(i) * width]);
         for (int i = n_ - 1; i >= 0; --i) {
-            double sum[B];
-            for (int r = 0; r < B; ++r) {
-                sum[r] = 0.0;
-                for (int c = 0; c < B; ++c) sum[r] += inverse_[i][r * B + c] * y[i * B + c];
-            }
-            for (int q = start_[i]; q < start_[i + 1]; ++q)
+            double* own = &y[std::size_t(i) * width];
+            double sum[width] = {};
+            for (int r = 0; r < B; ++r)
+                for (int c = 0; c < B; ++c)
+                    for (int k = 0; k < Columns; ++k) sum[r * Columns + k] += inverse_[i][r * B + c] * own[c * Columns + k];
+            for (int q = start_[i]; q < start_[i + 1]; ++q) {
+                const double* other = &y[std::size_t(index_[q]) * width];
                 for (int r = 0; r < B; ++r)
-                    for (int c = 0; c < B; ++c) sum[c] -= factor_[q][r * B + c] * y[index_[q] * B + r];
-            for (int r = 0; r < B; ++r) y[i * B + r] = sum[r];
+                    for (int c = 0; c < B; ++c)
+                        for (int k = 0; k < Columns; ++k)
+                            sum[c * Columns + k] -= factor_[q][r * B + c] * other[r * Columns + k];
+            }
+            std::copy_n(sum, width, own);
         }
-        for (int i = 0; i < n_; ++i)
-            for (int c = 0; c < B; ++c) x[i * B + c] = y[place_[i] * B + c];
+        for (int i = 0; i < n_; ++i) std::copy_n(&y[std::size_t(place_[i]) * width], width, x + std::size_t(i) * width);
     }
 
    private:
+    template <int Columns>
+    static void subtract(double* target, const Block<B>& a, const double* x) {
+        for (int r = 0; r < B; ++r)
+            for (int c = 0; c < B; ++c)
+                for (int k = 0; k < Columns; ++k) target[r * Columns + k] -= a[r * B + c] * x[c * Columns + k];
+    }
+
     // rows_: of each permuted row k, the rows before it that it shares an entry with, ascending.
     void collect(const std::vector<std::pair<int, int>>& links) {
         std::vector<std::vector<int>> before(n_);

@@ -7,6 +7,7 @@
 #include "paths.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
+#include "twolevel.hpp"
 
 namespace py = pybind11;
 using namespace flexpara;
@@ -46,6 +47,35 @@ static py::array_t<T> array_of(const std::vector<T>& values, py::ssize_t row = 0
 
 static py::array_t<Index> pairs_of(const std::vector<std::array<Index, 2>>& pairs) {
     return array_of<Index>(pairs.empty() ? nullptr : pairs[0].data(), 2 * pairs.size(), 2);
+}
+
+// A matrix of scipy's, in rows.
+static Rows rows_of(const py::object& matrix) {
+    const auto begin = matrix.attr("indptr").cast<Array<int>>(), column = matrix.attr("indices").cast<Array<int>>();
+    const auto value = matrix.attr("data").cast<Numbers>();
+    return {{begin.data(), begin.data() + begin.size()},
+            {column.data(), column.data() + column.size()},
+            {value.data(), value.data() + value.size()}};
+}
+
+static void define_solvers(py::module_& module) {
+    py::class_<TwoLevel>(module, "TwoLevel")
+        .def(py::init([](const py::object& matrix, const py::object& weights, const py::object& coarse,
+                         double tolerance, int most) {
+            return TwoLevel(rows_of(matrix), rows_of(weights), rows_of(coarse), tolerance, most);
+        }))
+        .def("solve", [](const TwoLevel& solver, const Numbers& right, const Numbers& start, double size) {
+            TwoLevel::Pairs wanted(right.shape(0)), found(right.shape(0));
+            if (right.size()) {
+                std::copy_n(right.data(), right.size(), wanted[0].data());
+                std::copy_n(start.data(), start.size(), found[0].data());
+            }
+            {
+                py::gil_scoped_release free;
+                solver.solve(wanted, found, size);
+            }
+            return array_of<double>(found.empty() ? nullptr : found[0].data(), 2 * found.size(), 2);
+        });
 }
 
 static void define_pieces(py::module_& module) {
@@ -177,7 +207,9 @@ static void define_topology(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
+    module.attr("edition") = 2;
     define_pieces(module);
+    define_solvers(module);
     define_overlap(module);
     define_topology(module);
 }

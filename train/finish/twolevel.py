@@ -7,15 +7,18 @@ steps are few whatever n is, and memory grows with n where a factorization's fil
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
+from ...runtime.kernel.choice import kernel
 from .curvature import factorize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.sparse.linalg import SuperLU
 
 
 class TwoLevel:
@@ -26,11 +29,24 @@ class TwoLevel:
         self.matrix, self.coarse, self.tolerance, self.most = matrix, coarse, tolerance, most
         self.scale = np.reciprocal(np.asarray(matrix.diagonal(), dtype=np.float64))[:, None]
         self.transposed = sparse.csr_array(coarse.T)
-        self.solver = factorize(sparse.csr_array(self.transposed @ matrix @ coarse))
+        self.small = sparse.csr_array(self.transposed @ matrix @ coarse)
+
+    @cached_property
+    def solver(self) -> SuperLU:
+        """Of the coarse level."""
+        return factorize(self.small)
+
+    @cached_property
+    def compiled(self) -> Any | None:
+        """The same by the kernel, for two columns."""
+        compiled = kernel()
+        return compiled and compiled.TwoLevel(self.matrix, self.coarse, self.small, self.tolerance, self.most)
 
     def solve(self, right: NDArray[np.float64], start: NDArray[np.float64] | None, size: float) -> NDArray[np.float64]:
         """X (n, c) for right sides (n, c), from ``start``: each column by itself, all at once; size: of residuals."""
         x = np.zeros_like(right) if start is None else start.copy()
+        if right.shape[1] == 2 and self.compiled is not None:
+            return self.compiled.solve(right, x, size)
         residual = right - self.matrix @ x
         z = self.preconditioned(residual)
         direction, product = z.copy(), column_products(residual, z)

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from flexpara.runtime.errors import MissingDependencyError
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.kernel import choice
 from flexpara.runtime.kernel.choice import SWITCH, kernel, twins_only
@@ -55,3 +57,9 @@ def test_every_file_of_the_kernel_is_listed() -> None:
     (extension,) = tools["ext-modules"]
     found = {path.relative_to(ROOT).as_posix() for path in (ROOT / "runtime" / "kernel").glob("*.?pp")}
     assert found == {*extension["sources"], *extension["depends"]}
+
+
+def test_a_kernel_of_other_sources_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choice, "import_module", lambda *_: SimpleNamespace(edition=-1))
+    with pytest.raises(MissingDependencyError, match=r"edition -1, expected .*build_kernel"):
+        choice.compiled()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.train.finish.twolevel import TwoLevel
 
 
@@ -66,3 +67,16 @@ def test_no_more_steps_are_made_than_allowed() -> None:
         TwoLevel(chain(97), hats(97, 8)[:, :-1], 1e-12, most).solve(right, None, 1.0) for most in (1, 500)
     )
     assert np.abs(one - all_of_them).max() > 1e-3
+
+
+def test_the_kernel_solves_as_its_twin_does_and_leaves_what_is_given() -> None:
+    if kernel() is None:
+        pytest.skip("nothing was compiled")
+    matrix, right = chain(401), np.random.default_rng(3).normal(size=(401, 2))
+    start, size = np.zeros_like(right), float(np.linalg.norm(right))
+    found = TwoLevel(matrix, hats(401, 8)[:, :-1], 1e-11, 500).solve(right, start, size)
+    with twins_only():
+        expected = TwoLevel(matrix, hats(401, 8)[:, :-1], 1e-11, 500).solve(right, start, size)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+    assert not start.any()
+    assert np.linalg.norm(right - matrix @ found) <= 1e-9 * size
