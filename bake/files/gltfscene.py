@@ -7,8 +7,9 @@ are TEXCOORD_0, and the old sets follow one number further up.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -80,8 +81,9 @@ def scene_tree(pages: list[Page]) -> tuple[dict[str, Any], bytes]:
     slices = [(page, piece) for page in pages for piece in slices_of(page, document)]
     materials = Materials(editing, _kept(editing.tree, [piece.part for _, piece in slices]))
     baked = {id(page): _embedded(editing, page, page.asset.stem if len(pages) > 1 else "") for page in pages}
+    begun = set[tuple[int, int]]()
     for page, piece in slices:
-        _rewrite(editing, materials, page, piece, baked[id(page)])
+        _rewrite(_primitive(editing, piece.part, begun), editing, materials, Laid(page, piece, baked[id(page)]))
     editing.tree["asset"]["generator"] = f"flexpara {__version__}"
     return editing.finished()
 
@@ -141,9 +143,30 @@ def _embedded(editing: Editing, page: Page, atlas: str) -> Baked:
     return Baked(atlas, numbers, strength=emissive_strength(page.asset) if "emissive" in numbers else 1.0)
 
 
-def _rewrite(editing: Editing, materials: Materials, page: Page, piece: Slice, baked: Baked) -> None:
+class Laid(NamedTuple):
+    """What one primitive becomes: a page's slice of it, with the page's textures."""
+
+    page: Page
+    piece: Slice
+    baked: Baked
+
+
+def _primitive(editing: Editing, part: Part, begun: set[tuple[int, int]]) -> dict[str, Any]:
+    """The primitive that a slice is written to: the part's own, and for those of further pages a new one beside it.
+
+    begun: parts of which a slice was written; this one comes in.
+    """
+    primitives, place = editing.tree["meshes"][part.mesh]["primitives"], (part.mesh, part.primitive)
+    if place in begun:
+        primitives.append(deepcopy(editing.file.tree["meshes"][part.mesh]["primitives"][part.primitive]))
+        return primitives[-1]
+    begun.add(place)
+    return primitives[part.primitive]
+
+
+def _rewrite(primitive: dict[str, Any], editing: Editing, materials: Materials, laid: Laid) -> None:
     """One primitive: its vertices, indices, uv and material."""
-    primitive = editing.tree["meshes"][piece.part.mesh]["primitives"][piece.part.primitive]
+    page, piece, baked = laid
     file = editing.file
     original = file.tree["meshes"][piece.part.mesh]["primitives"][piece.part.primitive]
     columns, targets = primitive_columns(file, original)

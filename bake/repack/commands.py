@@ -51,7 +51,7 @@ def pack(
         from .repacked import TOGETHER, pack_assets
     paths = meshes_of(mesh)
     assets = [shaded(load(path, options.select), options.crease_angle) for path in paths]
-    endings = [path.suffix for path in paths]
+    endings = [options.ending(path.suffix) for path in paths]
     losses = [lost(asset, outputs.for_mesh(asset, ending)) for asset, ending in zip(assets, endings, strict=True)]
     for asset, loss in zip(assets, losses, strict=True):
         console.note_changes(asset, loss)

@@ -11,9 +11,10 @@ import numpy as np
 from ... import __version__
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
+from ...runtime.geometry.triangles import signed_areas
 from ...runtime.options.keywords import from_keywords
 from ...runtime.options.pack import PackOptions, PackOutputs
-from ...runtime.pack.repack import repack
+from ...runtime.pack.repack import repack, repack_pages
 from ...runtime.pack.square import square_of
 from ...runtime.progress import Clock
 from ..checks import check_outputs, chosen_maps
@@ -22,6 +23,8 @@ from ..results.output import BakeJob, texture_notes, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from ...runtime.files import OutputFolder
     from ...runtime.io.meshfile import MeshLike
@@ -37,7 +40,8 @@ class PackResult:
     """Meshes whose islands share a page.
 
     assets: the meshes as read and cleaned.  suffixes: endings of their files.  asset: all of them as one mesh.
-    atlas: its islands in their new places.  report: changes, settings, metrics; ready for JSON.
+    atlas: its islands in their new places; of several pages, each in its UDIM tile.  page: (f,) that of each face,
+    None where one page is all.  report: changes, settings, metrics; ready for JSON.
     """
 
     assets: tuple[Asset, ...]
@@ -45,6 +49,7 @@ class PackResult:
     asset: Asset = field(repr=False)
     atlas: Atlas = field(repr=False)
     report: dict[str, Any] = field(repr=False)
+    page: NDArray[np.int64] | None = field(default=None, repr=False)
 
     @property
     def atlases(self) -> list[Atlas]:
@@ -96,7 +101,12 @@ class PackResult:
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact that a user should know."""
         from ...runtime.io.changes import told
+        from .pages import write_on_pages, write_on_tiles
 
+        if self.page is not None:
+            write = write_on_tiles if self.report["settings"]["udim"] else write_on_pages
+            output.write_report({**write(self, output, outputs, clock, note), "seconds": clock.rounded})
+            return output.commit()
         whole, pieces = self.jobs(outputs)
         named = [f"{piece.asset.stem}.{kind}" for piece in pieces for kind in piece.outputs.formats]
         check_outputs(output, whole.outputs, whole.maps, meshes=False, more=named)
@@ -132,7 +142,7 @@ def pack(
 
     options = from_keywords(PackOptions, options, keywords)
     assets = [shaded(load(entry, options.select), options.crease_angle) for entry in mesh]
-    endings = [Path(entry).suffix if isinstance(entry, str | Path) else ".glb" for entry in mesh]
+    endings = [options.ending(Path(entry).suffix) if isinstance(entry, str | Path) else ".glb" for entry in mesh]
     return pack_assets(assets, endings, options, None, Clock.of(progress))
 
 
@@ -157,7 +167,12 @@ def pack_assets(
     whole = merge_assets(assets)
     whole = whole if len(assets) == 1 else replace(whole, stem=TOGETHER)
     with clock.stage("pack"):
-        packed = repack(whole, square_of(options), equal=options.density == "equal", seed=options.seed)
+        equal, page = options.density == "equal", None
+        if options.udim or options.pages > 1:
+            square = square_of(options)
+            packed, page = repack_pages(whole, square, options.pages, equal=equal, seed=options.seed)
+        else:
+            packed = repack(whole, square_of(options), equal=equal, seed=options.seed)
     with clock.stage("measure"):
         atlas = packed.atlas
         metrics = measure(whole.surface, atlas.corner_uv, atlas.face_chart, size=options.size, stack=atlas.face_stack)
@@ -168,9 +183,15 @@ def pack_assets(
         "changes": {name: sum(one.get(name, 0) for one in changes) for one in changes for name in one if one[name]},
         "settings": {**asdict(options), "padding": options.margin},
         "pack": packed.report,
-        "metrics": metrics.to_dict(),
+        "metrics": {**metrics.to_dict(), **({} if page is None else _of_pages(packed.atlas, int(page.max()) + 1))},
     }
-    return PackResult(tuple(assets), tuple(suffixes), whole, packed.atlas, report)
+    return PackResult(tuple(assets), tuple(suffixes), whole, packed.atlas, report, page)
+
+
+def _of_pages(atlas: Atlas, count: int) -> dict[str, Any]:
+    """What the metrics of one page are of several: the share of all of them that is used."""
+    used = float(np.abs(signed_areas(atlas.corner_uv)).sum())
+    return {"packing_efficiency": used / count, "packing_square": "unit", "pages": count}
 
 
 def _with_set(asset: Asset, number: int) -> Asset:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 OWN = "own"
 """Format of a file as it was given."""
 DENSITIES = ("equal", "kept")
+MOST_PAGES = 1000
+"""UDIM has no more tiles."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +27,11 @@ class PackOptions(Seeded, AtlasOptions):
 
     density: Literal["equal", "kept"] = "equal"
     """Texels per unit of the source: equal on all islands, or kept as they are beside each other."""
+    pages: int = 1
+    """Pages that the islands are shared out to, 1 to 1000, at one texel density: where one would be too coarse."""
+    udim: Flag = False
+    """Lay each page into a square of uv of its own, as UDIM tiles 1001, 1002, …, with textures STEM_MAP.1001.png and so
+    on.  Without it each page has a material and textures of its own in one glb or gltf file."""
 
     def __post_init__(self) -> None:
         AtlasOptions.__post_init__(self)
@@ -32,7 +39,16 @@ class PackOptions(Seeded, AtlasOptions):
         found = f"density is {self.density!r}, expected equal or kept"
         demand(self.density in DENSITIES, f"{found}; pass for instance --density kept")
         both = self.density == "kept" and self.texel_density is not None
+        found = f"pages is {self.pages}, expected 1 to {MOST_PAGES}"
+        demand(1 <= self.pages <= MOST_PAGES, f"{found}; pass for instance --pages 4")
+        stacked = self.pages > 1 and self.stack != "off"
+        demand(not stacked, "stack with several pages, expected one of the two; leave the other out")
         demand(not both, "density kept with a texel-density, expected one of the two; leave the other out")
+
+    def ending(self, suffix: str) -> str:
+        """Ending of a mesh's own format: of files with one material, glb where each page gets one."""
+        several = self.pages > 1 and not self.udim and suffix.lower() not in (".glb", ".gltf")
+        return ".glb" if several else suffix
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -294,7 +294,9 @@ class Outputs(FileOptions, MapOptions):
     def for_pages(self) -> None:
         """Raises: InputError for what a mesh with several atlases can't be written as."""
         found, fits = ", ".join(self.formats), set(self.formats) <= set(SCENES)
-        demand(fits, f"several atlases with format {found}, expected glb or gltf; leave --atlas or --format out")
+        demand(
+            fits, f"several atlases with format {found}, expected glb or gltf, which hold several; pass --format glb"
+        )
         demand(not self.layers, "several atlases with layers, expected one of the two; leave the other out")
         demand(not self.report, "several atlases with report, expected one of the two; leave the other out")
 

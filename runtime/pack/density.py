@@ -75,7 +75,7 @@ def _reached(asset: Asset, charts: Charts, side: float, padding: int, seed: int,
 
 
 def _shrunk(asset: Asset, charts: Charts, square: Square, found: Packed, factor: float, config: PackConfig) -> Packed:
-    """The charts of an atlas as a part of another: uv × factor."""
+    """The charts of an atlas as a part of another: uv × factor, which is at most 1."""
     assert found.atlas.placement is not None
     edges = outline_edges(asset.surface.faces, charts)
     placement = aligned(found.atlas.placement * factor, chart_outlines(charts, edges), square.size, config)
