@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
-from .carry.config import CarryConfig, FineConfig, HasteConfig
+from .carry.config import ArcConfig, CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import FlapConfig, ProjectConfig, SlitConfig
 from .seams.config import ClosingConfig
@@ -176,6 +176,8 @@ class FinishConfig:
     """Handles that a first cluster may have: a part with more starts from more clusters than charts were asked for."""
     carry: CarryConfig = field(default_factory=CarryConfig)
     """From the proxy back to the surface."""
+    arcs: ArcConfig = field(default_factory=ArcConfig)
+    """Seams made straight."""
     fine: FineConfig = field(default_factory=FineConfig)
     """Parts of many faces."""
     haste: HasteConfig = field(default_factory=HasteConfig)

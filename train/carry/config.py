@@ -100,3 +100,19 @@ class HasteConfig:
     """Of any surface …"""
     seconds_per_face: float = 6e-5
     """… and for each of its faces: they are carried back, laid out, proven and packed."""
+
+
+@dataclass(frozen=True)
+class ArcConfig:
+    """Seams between two junctions, made straight along the edges of the surface."""
+
+    passes: tuple[tuple[float, int], ...] = ((1.5, 8), (1.5, 8), (2.0, 16), (3.0, 60))
+    """Of each pass: how far from its place an arc may go, in edges of its own mean length, and its most edges."""
+    turning: float = 0.3
+    """Price of a turn by a right angle, as a share of what the two edges beside it cost on average."""
+    least: int = 3
+    """Edges of an arc that is looked at."""
+    rounds: int = 6
+    """Times that arcs are put back where a piece would be worse, before all of them are."""
+    most_faces: int = 30000
+    """Faces of a surface on which seams are left as they are."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
+from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
@@ -184,6 +185,7 @@ def brought_back(
     if not late():
         found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)
+        found = with_straight_arcs(found, config.arcs, late)
         found.polish()
         found = spent_fine(found, charts, config, late) if config.stretch else found
     found.mend()

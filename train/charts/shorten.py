@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.geometry.topology import edge_table
+from ..carry.arcs import straight_pieces
 from ..carry.carry import WALL
 from ..finish.flaps import restricted
 from ..finish.pieces import Piece, measured
@@ -43,7 +44,7 @@ def shortened(surface: Surface, pieces: list[Piece], page: float, most: int, con
             found += [
                 measured(surface, piece.ids[rows], restricted(piece.flat, rows), 1.0, piece.slits) for rows in parts
             ]
-    return found
+    return straight_pieces(surface, found, config) if len(found) > len(pieces) else found
 
 
 def page_side(piece: Piece) -> float:

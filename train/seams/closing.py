@@ -198,6 +198,27 @@ def laid_open(
 
     None where they are no disk then, or their excess energy is above ``goal``.
     """
+    opened = opened_along(search, ids, seam)
+    if opened is None:
+        return None
+    disk, slits = opened
+    if start is None and len(boundary_loops(disk.faces)) == 1:
+        first = border_first(disk, sorted_loops(disk)[0], search.config.slit.contact.cotangents)
+        if lies_over_itself(disk, first, search.config.closing.hopeless):
+            return None
+        start = lambda _: first  # noqa: E731
+    uv = flattened(disk, search.config.slit.contact, goal * search.area, start)
+    if uv is None or excess_energy(disk, uv) > goal * search.area:
+        return None
+    if rim_overlaps(disk.faces, boundary_edges(disk.faces), uv):
+        return Overlapping(ids, Flat(disk, uv, {}), slits)
+    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+
+
+def opened_along(
+    search: Search, ids: NDArray[np.int64], seam: NDArray[np.bool_]
+) -> tuple[Surface, tuple[Slit, ...]] | None:
+    """Faces cut along a mask (e,) of the surface's edges, and the slits that are; None where that is no disk."""
     surface = search.surface
     faces = surface.faces[ids]
     used, local = np.unique(faces, return_inverse=True)
@@ -207,22 +228,10 @@ def laid_open(
     source[table.face_edges.reshape(-1)] = search.table.face_edges[ids].reshape(-1)
     cut = table.manifold & seam[source]
     opened, old = cut_open(whole.faces, cut, table)
-    disk = Surface(whole.vertices[old], opened)
     loops = len(boundary_loops(opened))
     if loops == 0 or 2 - loops != euler_characteristic(opened):
         return None
-    if start is None and loops == 1:
-        first = border_first(disk, sorted_loops(disk)[0], search.config.slit.contact.cotangents)
-        if lies_over_itself(disk, first, search.config.closing.hopeless):
-            return None
-        start = lambda _: first  # noqa: E731
-    uv = flattened(disk, search.config.slit.contact, goal * search.area, start)
-    if uv is None or excess_energy(disk, uv) > goal * search.area:
-        return None
-    slits = as_slits(whole, cut)
-    if rim_overlaps(opened, boundary_edges(opened), uv):
-        return Overlapping(ids, Flat(disk, uv, {}), slits)
-    return measured(surface, ids, Flat(disk, uv, {}), search.area, slits)
+    return Surface(whole.vertices[old], opened), as_slits(whole, cut)
 
 
 def lies_over_itself(disk: Surface, uv: NDArray[np.float64], most: float) -> bool:

@@ -1,0 +1,247 @@
+"""Arcs of seams made straight: between junctions, borders and slits take the straightest way along the edges nearby.
+
+The shortest borders of `straighten` have teeth wherever edges run slantwise, and slits are not borders at all.  Here
+seams are one network of chains.  Each may leave its place by a few edges; the pieces beside are laid out anew from
+where they lay, and an arc goes back where a piece would not be valid, or gain more energy than the arc saves.
+e edges of the surface's table · f faces · lengths in √A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...runtime.deadline import Late, never
+from ...runtime.geometry.cutgraph import edge_costs, path_mask
+from ...runtime.geometry.distortion import excess, oriented_energy
+from ...runtime.geometry.straightpaths import Roads, straightest_path
+from ...runtime.geometry.topology import edge_table, face_components
+from ..finish.arap import RigidSteps, evened_out
+from ..finish.contact import Relaxed, boundary_edges, relax, rim_overlaps, separate
+from ..finish.flatten import jacobians, sorted_loops
+from ..finish.pieces import Overlapping, Piece, flattened, measured
+from ..finish.slits import Flat
+from ..seams.closing import opened_along, path_length
+from ..seams.network import chains, seam_edges
+from ..search.labels import dual_graph
+from ..search.search import Search
+from ..workers import parallel_map
+from .fine import bounded
+from .layout import carried_jacobians
+from .sides import faces_beside
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Surface
+    from ..config import FinishConfig
+    from .config import ArcConfig
+
+    Laid = Piece | Overlapping | None
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A part of a chain that may take another way.
+
+    old, new: edges (n,) of the table.  sides: keys of the pieces beside it.  saved: length by which the new way is
+    shorter.
+    """
+
+    old: NDArray[np.int64]
+    new: NDArray[np.int64]
+    sides: tuple[int, ...]
+    saved: float
+
+
+def with_straight_arcs(search: Search, config: ArcConfig, late: Late = never) -> Search:
+    """The search with its seams' arcs straightened, where that does not raise its objective: pass by pass."""
+    for number, (width, longest) in enumerate(config.passes):
+        if late() or len(search.surface.faces) > config.most_faces:
+            break
+        arcs = straighter_arcs(search, width, longest, config, shifted=number % 2 == 1)
+        search = Straightening(search, arcs).run(config.rounds)
+    return search
+
+
+def straight_pieces(surface: Surface, pieces: list[Piece], config: FinishConfig) -> list[Piece]:
+    """The charts of a part of area 1 with their seams' arcs straightened."""
+    search = Search(surface, dual_graph(surface, edge_table(surface.faces), config.labels.seams), config)
+    for piece in pieces:
+        search.add(piece)
+    return list(with_straight_arcs(search, config.arcs).pieces.values())
+
+
+class Straightening:
+    """One pass: the arcs that are left, and the layouts of pieces that were found."""
+
+    def __init__(self, search: Search, arcs: list[Arc]) -> None:
+        self.search, self.arcs = search, arcs
+        self.plain, self.label = seam_edges(search), search.label()
+        self.known: dict[tuple[int, frozenset[int]], Laid] = {}
+        self.failed: set[int] = set()
+
+    def run(self, rounds: int) -> Search:
+        """The search with those of the arcs on their new ways that leave every piece valid and do not cost more."""
+        for _ in range(rounds):
+            if not self.arcs:
+                break
+            found, wrong = self.laid()
+            if found is not None and self.is_no_worse(found):
+                return found
+            gain = self.gains(found) if found is not None else -self.nearest(wrong)
+            back = gain < 0.0 if (gain < 0.0).any() else gain <= gain.min()
+            failed = set(self.label[wrong > 0.0].tolist())
+            stuck = np.array([bool(failed & self.failed & set(arc.sides)) for arc in self.arcs])
+            self.failed |= failed
+            self.arcs = [arc for arc, each in zip(self.arcs, back | stuck, strict=True) if not each]
+        return self.search
+
+    def is_no_worse(self, found: Search) -> bool:
+        """Whether the objective is no higher, and the stretch within its bound, if it was."""
+        bound = max(found.config.stretch or np.inf, self.search.energy())
+        return found.objective() <= self.search.objective() and found.energy() <= bound
+
+    def laid(self) -> tuple[Search | None, NDArray[np.float64]]:
+        """The search with the arcs on their new ways; None where a piece is not valid then.
+
+        With a weight (f,) on the faces that make it so: those that overlap, or all of a piece.
+        """
+        table, keys, wrong = self.search.table, list(self.search.pieces), np.zeros(len(self.label))
+        seam = self.moved()
+        part = face_components(len(self.label), table.edge_faces[table.manifold & ~seam])
+        sides = [np.flatnonzero(part == number) for number in range(int(part.max()) + 1)]
+        owner = [int(np.bincount(self.label[ids]).argmax()) for ids in sides]
+        if sorted(owner) != sorted(keys):
+            wrong[~np.isin(self.label, [key for key in keys if owner.count(key) == 1])] = 1.0
+            return None, wrong
+        made = parallel_map(lambda job: self.piece(*job, seam), list(zip(owner, sides, strict=True)))
+        found = Search(self.search.surface, self.search.graph, self.search.config)
+        for key, ids, (name, laid) in zip(owner, sides, made, strict=True):
+            self.known[key, name] = laid
+            if isinstance(laid, Piece) and self.search.is_bearable(laid):
+                found.add(laid)
+            else:
+                wrong[ids[laid.pairs()] if isinstance(laid, Overlapping) else ids] = 1.0
+        return (None if wrong.any() else found), wrong
+
+    def moved(self) -> NDArray[np.bool_]:
+        """(e,) bool: the seams with the arcs on their new ways."""
+        seam = self.plain.copy()
+        for arc in self.arcs:
+            seam[arc.old] = False
+        for arc in self.arcs:
+            seam[arc.new] = True
+        return seam
+
+    def piece(self, key: int, ids: NDArray[np.int64], seam: NDArray[np.bool_]) -> tuple[frozenset[int], Laid]:
+        """What becomes of a piece, once for the same arcs beside it; and their names."""
+        name = frozenset(id(arc) for arc in self.arcs if key in arc.sides)
+        if not name:
+            return name, self.search.pieces[key]
+        known = self.known.get((key, name), "new")
+        return name, laid_alike(self.search, ids, seam, self.search.pieces[key]) if known == "new" else known
+
+    def gains(self, found: Search) -> NDArray[np.float64]:
+        """(n,) what each arc lowers the objective by: its length saves, the energy that faces near it gained costs."""
+        lost = self.nearest(face_energies(found) - face_energies(self.search)) / self.search.area
+        return self.search.price * np.array([arc.saved for arc in self.arcs]) - lost
+
+    def nearest(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) sums of values (f,) of faces, each given to the arc that lies nearest."""
+        ends = self.search.surface.vertices[self.search.table.edges]
+        middles = [ends[np.union1d(arc.old, arc.new)].mean(axis=1) for arc in self.arcs]
+        owner = np.repeat(np.arange(len(middles)), [len(points) for points in middles])
+        near = owner[KDTree(np.concatenate(middles)).query(self.search.centroids)[1]]
+        return np.bincount(near, value, minlength=len(middles))
+
+
+def face_energies(search: Search) -> NDArray[np.float64]:
+    """(f,) area · excess of each face."""
+    energy = np.zeros(len(search.surface.faces))
+    for piece in search.pieces.values():
+        energy[piece.ids] = excess(oriented_energy(jacobians(piece.flat.surface, piece.flat.uv)))
+    return energy * search.areas
+
+
+def laid_alike(search: Search, ids: NDArray[np.int64], seam: NDArray[np.bool_], source: Piece) -> Laid:
+    """Faces cut along a mask (e,), laid out from where their source lies; None where they are no disk, or fold."""
+    opened = opened_along(search, ids, seam)
+    if opened is None:
+        return None
+    disk, slits = opened
+    contact = replace(search.config.slit.contact, rounds=search.config.closing.rounds)
+    start = evened_out(disk.faces, as_it_lay(disk, source.flat, search.config), contact.unfolding)
+    edges = boundary_edges(disk.faces)
+    if start is not None and len(sorted_loops(disk)) == 1 and not rim_overlaps(disk.faces, edges, start):
+        uv = relax(disk, Relaxed(start, {}), contact).uv
+    else:
+        uv = flattened(disk, contact, np.inf, lambda filled: as_it_lay(filled, source.flat, search.config))
+    if uv is not None and rim_overlaps(disk.faces, edges, uv):
+        apart = separate(disk, Relaxed(uv, {}), edges, contact)
+        if apart is None:
+            return Overlapping(ids, Flat(disk, uv, {}), slits)
+        uv = apart.uv
+    return None if uv is None else measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+
+
+def as_it_lay(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.float64]:
+    """Uv (v, 2) of a piece that differs from its source along the border: the source's own, stretch and all."""
+    nearest = faces_beside(disk, source, config)
+    return RigidSteps(disk).solve(bounded(carried_jacobians(disk, source, nearest), config.fine.steepest))
+
+
+def straighter_arcs(search: Search, width: float, longest: int, config: ArcConfig, *, shifted: bool) -> list[Arc]:
+    """Arcs that have a straighter way no farther off than ``width`` mean edges; any of them may be taken.
+
+    No new way meets another arc, old or new.  longest: edges of an arc.  shifted: chains are parted elsewhere.
+    """
+    table, points, seam = search.table, search.surface.vertices, seam_edges(search)
+    parts = [
+        (part, chain.sides) for chain in chains(search, seam) for part in parted(chain.path, longest, shifted=shifted)
+    ]
+    barred = np.zeros(len(points), dtype=bool)
+    barred[table.edges[seam | ~table.manifold]] = True
+    free = table.manifold & ~seam
+    cost = edge_costs(search.surface, table, search.config.slit.seams)
+    tree, found = KDTree(points), []
+    for path, sides in sorted(parts, key=lambda part: len(part[0])):
+        old = np.flatnonzero(path_mask(table, [path.tolist()]))
+        if len(old) < config.least:
+            continue
+        reach = width * path_length(search, old) * search.unit / len(old)
+        near = np.zeros(len(points), dtype=bool)
+        near[np.concatenate(tree.query_ball_point(points[path], reach)).astype(np.int64)] = True
+        near[barred] = False
+        near[path] = True
+        inside = np.append(np.flatnonzero(near[table.edges].all(axis=1) & free), old)
+        roads = Roads(points, table.edges[inside], cost[inside])
+        way = straightest_path(roads, int(path[0]), int(path[-1]), config.turning)
+        new = np.flatnonzero(path_mask(table, [way])) if way else old
+        if not np.array_equal(new, old):
+            barred[way] = True
+            found.append(Arc(old, new, sides, path_length(search, old) - path_length(search, new)))
+    return found
+
+
+def parted(path: NDArray[np.int64], longest: int, *, shifted: bool) -> list[NDArray[np.int64]]:
+    """A chain in parts of like length of so many edges at most, a closed one in three at least.
+
+    shifted: the first part is half as long, or a closed chain begins half a part later.
+    """
+    closed, length = path[0] == path[-1], len(path) - 1
+    count = max(-(-length // longest), 3 if closed else 1)
+    if length < count:
+        return []
+    if closed and shifted:
+        ring = np.roll(path[:-1], -(length // (2 * count)))
+        path = np.append(ring, ring[0])
+    places = np.linspace(0, length, count + 1)
+    if shifted and not closed and count > 1:
+        places = np.concatenate([[0.0], (places[1:] + places[:-1]) / 2.0, [length]])
+    at = places.astype(np.int64)
+    return [path[first : last + 1] for first, last in pairwise(at.tolist()) if last > first]
