@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..runtime.geometry.topology import edge_table, split_non_manifold_vertices
 from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
 from .charts.charts import Finished, chart_surface
 from .deploy.fit import fit_networks
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from torch import nn
 
     from ..runtime.deadline import Deadline
@@ -42,7 +44,13 @@ class Trained:
     paper: nn.Module | None = None
 
 
-def train(surface: Surface, config: TrainConfig, progress: Progress, deadline: Deadline | None = None) -> Trained:
+def train(
+    surface: Surface,
+    config: TrainConfig,
+    progress: Progress,
+    deadline: Deadline | None = None,
+    wanted: NDArray[np.bool_] | None = None,
+) -> Trained:
     """Charts and networks of a welded surface.
 
     Args:
@@ -50,13 +58,15 @@ def train(surface: Surface, config: TrainConfig, progress: Progress, deadline: D
         config: numbers.
         progress: told the stages.
         deadline: when the search ends with the best it has; None: it ends by itself, the same every time.
+        wanted: (e,) edges of the surface's edge table that become seams: it is cut open there before it is charted.
 
     Raises:
         FinishError: no valid charts could be made (a defect).
     """
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
-    finished = chart_surface(ball, config.charts, config.finish, config.seed, Stages(progress, deadline))
+    opened = ball if wanted is None else cut_along(ball, wanted)
+    finished = chart_surface(opened, config.charts, config.finish, config.seed, Stages(progress, deadline))
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
@@ -70,6 +80,12 @@ def train(surface: Surface, config: TrainConfig, progress: Progress, deadline: D
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
+
+
+def cut_along(surface: Surface, wanted: NDArray[np.bool_]) -> Surface:
+    """The surface, its faces in their order, open along edges (e,) of its table."""
+    faces, old = split_non_manifold_vertices(surface.faces, wanted, edge_table(surface.faces))
+    return Surface(surface.vertices[old], faces)
 
 
 def as_charts(surface: Surface, finished: Finished) -> Charts:

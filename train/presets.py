@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ..runtime.extras import requires
+from ..runtime.io.wantedseams import wanted_seams
 from ..runtime.mesh import Frame
 from .cloud.config import CloudConfig
 from .cloud.reconstruct import reconstruct
@@ -43,7 +44,8 @@ def train_asset(
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
     if options.preset != "paper":
-        return train(asset.surface, fast_config(options), clock, clock.deadline)
+        wanted = wanted_seams(asset, options, options.crease_angle)
+        return train(asset.surface, fast_config(options), clock, clock.deadline, wanted)
     with requires("train"):
         from .paper.batches import PaperInput
         from .paper.checkpoint import Checkpoints

@@ -4,13 +4,17 @@ Annotations are evaluated here, as there.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
-from .words import demand
+from .words import Names, demand, demand_known
 
 AUTO = "auto"
 MANY = 10_000
 """The most charts of a connected part where as many as pay are asked for."""
+KEPT = ("uv", "hard", "material")
+"""Borders of a mesh that can stay."""
+HARD = ("free", "split")
 DEAREST, LEAST_STRETCH, MOST_STRETCH = 10.0, 1.0001, 2.0
 
 
@@ -26,6 +30,14 @@ class SeamOptions:
     max_stretch: float | None = None
     """Mean stretch (symmetric Dirichlet, 1 is none) that each connected part may have, for the shortest seams that
     keep it, for instance 1.025; by default the seam price decides alone."""
+    hard_edges: Literal["free", "split"] = "free"
+    """Whether every hard edge (split normals, smoothing groups, or the crease angle) becomes a seam: split, as normal
+    maps for games want it, or free."""
+    keep_seams: Names = ()
+    """Borders that stay seams: uv (those of the mesh's own uv), hard (hard edges), material.  New ones are added."""
+    cut: Path | None = None
+    """A text file of cuts to make: six numbers a line, two points; the shortest way along edges between the vertices
+    nearest to them becomes a seam."""
 
     def __post_init__(self) -> None:
         number = isinstance(self.charts, int) and not isinstance(self.charts, bool)
@@ -37,6 +49,15 @@ class SeamOptions:
         bounded = self.max_stretch is None or LEAST_STRETCH <= self.max_stretch <= MOST_STRETCH
         found = f"max-stretch is {self.max_stretch}, expected {LEAST_STRETCH:g} to {MOST_STRETCH:g}"
         demand(bounded, f"{found}; pass for instance --max-stretch 1.025")
+        demand_known("hard-edges", self.hard_edges, HARD)
+        for name in self.keep_seams:
+            demand(name in KEPT, f"keep-seams is {name!r}, expected some of {', '.join(KEPT)}; leave --keep-seams out")
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Kinds of borders that stay seams, each once."""
+        hard = ("hard",) if self.hard_edges == "split" else ()
+        return tuple(dict.fromkeys((*self.keep_seams, *hard)))
 
     @property
     def most_charts(self) -> int:
