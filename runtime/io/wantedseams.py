@@ -73,7 +73,7 @@ def torn(table: EdgeTable, corner: NDArray[np.float64], alike: float) -> NDArray
 def cuts_of(asset: Asset, table: EdgeTable, path: Path) -> NDArray[np.bool_]:
     """(e,) bool: the edges on the shortest ways between the two points of each line of a file, by nearest vertices."""
     points = asset.surface.vertices
-    ends = KDTree(points).query(read_cuts(path))[1]
+    ends = np.reshape(KDTree(points).query(read_cuts(path))[1], (-1, 2))
     apart = points[table.edges]
     length = np.maximum(np.linalg.norm(apart[:, 1] - apart[:, 0], axis=1), 1e-300)
     ways = []

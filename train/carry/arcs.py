@@ -143,8 +143,9 @@ class Straightening:
         name = frozenset(id(arc) for arc in self.arcs if key in arc.sides)
         if not name:
             return name, self.search.pieces[key]
-        known = self.known.get((key, name), "new")
-        return name, laid_alike(self.search, ids, seam, self.search.pieces[key]) if known == "new" else known
+        if (key, name) in self.known:
+            return name, self.known[key, name]
+        return name, laid_alike(self.search, ids, seam, self.search.pieces[key])
 
     def gains(self, found: Search) -> NDArray[np.float64]:
         """(n,) what each arc lowers the objective by: its length saves, the energy that faces near it gained costs."""
@@ -157,7 +158,7 @@ class Straightening:
         middles = [ends[np.union1d(arc.old, arc.new)].mean(axis=1) for arc in self.arcs]
         owner = np.repeat(np.arange(len(middles)), [len(points) for points in middles])
         near = owner[KDTree(np.concatenate(middles)).query(self.search.centroids)[1]]
-        return np.bincount(near, value, minlength=len(middles))
+        return np.bincount(near, value, minlength=len(middles)).astype(np.float64)
 
 
 def face_energies(search: Search) -> NDArray[np.float64]:

@@ -44,7 +44,7 @@ def test_split_normals_of_the_file_decide_without_the_angle() -> None:
     flat = two_squares()
     apart = flat.faces.copy()
     apart[2:][apart[2:] == 1], apart[2:][apart[2:] == 4] = 6, 7
-    normals = np.zeros((8, 3)) + [0.0, 0.0, 1.0]
+    normals = np.tile([0.0, 0.0, 1.0], (8, 1))
     normals[[2, 5, 6, 7]] = [0.0, 0.6, 0.8]
     split = replace(
         flat,
