@@ -105,8 +105,13 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     trained: list[Surface] = []
 
     def train(
-        surface: Surface, settings: TrainConfig, progress: Progress | None = None, _: Deadline | None = None
+        surface: Surface,
+        settings: TrainConfig,
+        progress: Progress | None = None,
+        deadline: Deadline | None = None,
+        wanted: np.ndarray | None = None,
     ) -> Trained:
+        assert wanted is None or wanted.dtype == bool, (wanted, deadline)
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)
