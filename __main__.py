@@ -97,7 +97,8 @@ def unwrap(
         options: See Options.
         outputs: See Outputs.
         checkpoints: See CheckpointOptions.
-        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone.
+        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone; with
+            --report also STEM.compare.html.
         console: See Console.
     """
     if checkpoints.resume is not None:
@@ -114,22 +115,32 @@ def unwrap(
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")
     options = replace(options, padding=_padding(options, outputs))
     if compare:
-        return _compare(mesh, output, options, compare, console)
+        return _compare(mesh, output, options, compare, console, report=outputs.report)
     if STREAM in mesh or output == STREAM:
         return _stream(mesh, output, options, outputs, console)
     runs = [Run(path.absolute(), output, options, outputs, checkpoints.every) for path in meshes_of(mesh)]
     return _perform(runs[0], console) if len(runs) == 1 else max(_one_of_several(entry, console) for entry in runs)
 
 
-def _compare(mesh: Sequence[Path], output: Path, options: Options, words: Sequence[str], console: Console) -> int:
-    """A table and a sheet of each mesh with several numbers of charts."""
+def _compare(
+    mesh: Sequence[Path], output: Path, options: Options, words: Sequence[str], console: Console, *, report: bool
+) -> int:
+    """A table and a sheet of each mesh with several numbers of charts; a page to turn them around, where asked."""
     from .bake.pictures.comparison import compare
+    from .bake.report.gather import write_compared
+    from .runtime.files import write_whole
 
     for path in meshes_of(mesh):
         with console.progress() as progress:
             asset = load(path, options.select)
             found = compare(options, words, lambda each, asset=asset: unwrap_asset(asset, each, progress))
-        console.show({}, [found.write(output / f"{asset.stem}.compare.png", force=console.force)])
+        written = [found.write(output / f"{asset.stem}.compare.png", force=console.force)]
+        if report:
+            page = output / f"{asset.stem}.compare.html"
+            written.append(
+                write_whole(page, lambda place, rows=found.rows: write_compared(rows, place), force=console.force)
+            )
+        console.show({}, written)
         sys.stdout.write("" if console.quiet else found.table)
     return 0
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from time import perf_counter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from .canvas import Camera, Lines, draw, three_quarter_axes
 from .preview import FOOT, INK, LETTER_HEIGHT, LETTERS, PAPER, checker_cells, counted, layout, shading_normals, solid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -42,11 +43,12 @@ COLUMNS = {
 
 
 class Compared(NamedTuple):
-    """One unwrap.  numbers: of the table, by column."""
+    """One unwrap.  numbers: of the table, by column.  report: what is known besides."""
 
     asset: Asset
     atlas: Atlas
     numbers: dict[str, Any]
+    report: Mapping[str, Any] = MappingProxyType({})
 
 
 class Comparison(NamedTuple):
@@ -96,7 +98,7 @@ def compare(options: Options, words: Sequence[str], unwrap: Unwrap) -> Compariso
             "packing": metrics["packing_efficiency"],
             "seconds": perf_counter() - start,
         }
-        rows.append(Compared(result.asset, result.atlas, numbers))
+        rows.append(Compared(result.asset, result.atlas, numbers, result.report))
     return Comparison(tuple(rows))
 
 
@@ -104,7 +106,7 @@ def comparison_pixels(rows: Sequence[Compared]) -> NDArray[np.float32]:
     """(2 · PANEL + FOOT, PANEL · rows, 3) float32 linear light.  Raises: MissingDependencyError without OpenGL."""
     columns = []
     with open_context() as context:
-        for asset, atlas, numbers in rows:
+        for asset, atlas, numbers, _ in rows:
             colors = chart_colors(int(atlas.face_chart.max()) + 1)
             shape = solid(atlas, shading_normals(asset), colors[atlas.face_chart], cells=checker_cells(atlas))
             camera = Camera.fit(atlas.positions[atlas.faces].reshape(-1, 3), three_quarter_axes())

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
+    from ..pictures.comparison import Compared
 
 ENDINGS = ("glb", "gltf", "obj", "ply", "usda")
 """Mesh files beside a report, the first that is there; a usda file can't be read back."""
@@ -94,6 +95,26 @@ def write_result(output: OutputFolder, atlas: Atlas, asset: Asset, report: Mappi
         write_page(results, title, path)
 
     output.write(f"{title}.report.html", write)
+
+
+def write_compared(rows: Sequence[Compared], path: Path) -> None:
+    """Write the page of unwraps of one mesh that were asked for so many charts each.
+
+    Raises: InputError where they are too much for one page.
+    """
+    settings = ReportSettings()
+    found = [
+        reported(
+            f"at most {row.numbers['asked']}",
+            Shape.of_atlas(row.atlas, row.asset),
+            row.report,
+            path.parent,
+            settings.picture,
+        )
+        for row in rows
+    ]
+    _demand_room(found, settings)
+    write_page(found, f"{rows[0].asset.stem}, charts compared", path)
 
 
 def before_of(asset: Asset, uv: NDArray[np.float64] | None, after: Result) -> list[Result]:

@@ -9,6 +9,7 @@ import pytest
 
 import flexpara
 from flexpara.bake.pictures.comparison import FOOT, PANEL, Comparison, compare, comparison_pixels, numbers_of_charts
+from flexpara.bake.report.gather import write_compared
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.options.unwrap import Options
 
@@ -48,6 +49,14 @@ def test_a_sheet_is_written_over_another_file_only_when_forced(found: Comparison
     with pytest.raises(InputError):
         found.write(path, force=False)
     found.write(path, force=True)
+
+
+def test_a_page_of_them_names_each_by_what_was_asked(found: Comparison, tmp_path: Path) -> None:
+    write_compared(found.rows, tmp_path / "compare.html")
+    page = (tmp_path / "compare.html").read_text(encoding="utf-8")
+    assert "mesh, charts compared" in page
+    assert page.count("at most 1") >= 1
+    assert page.count("at most auto") >= 1
 
 
 @pytest.mark.parametrize("word", ["0", "few", "-1", "1.5"])
