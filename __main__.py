@@ -10,6 +10,7 @@ import os
 import sys
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -97,8 +98,8 @@ def unwrap(
         options: See Options.
         outputs: See Outputs.
         checkpoints: See CheckpointOptions.
-        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone; with
-            --report also STEM.compare.html.
+        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone;
+            with --report also STEM.compare.html.
         console: See Console.
     """
     if checkpoints.resume is not None:
@@ -136,10 +137,10 @@ def _compare(
             found = compare(options, words, lambda each, asset=asset: unwrap_asset(asset, each, progress))
         written = [found.write(output / f"{asset.stem}.compare.png", force=console.force)]
         if report:
-            page = output / f"{asset.stem}.compare.html"
-            written.append(
-                write_whole(page, lambda place, rows=found.rows: write_compared(rows, place), force=console.force)
-            )
+            page, title = output / f"{asset.stem}.compare.html", f"{asset.stem}, charts compared"
+            named = [(f"at most {row.numbers['asked']}", row.atlas, row.asset, row.report) for row in found.rows]
+            write = partial(write_compared, named, title)
+            written.append(write_whole(page, write, force=console.force))
         console.show({}, written)
         sys.stdout.write("" if console.quiet else found.table)
     return 0

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
-    from ..pictures.comparison import Compared
 
 ENDINGS = ("glb", "gltf", "obj", "ply", "usda")
 """Mesh files beside a report, the first that is there; a usda file can't be read back."""
@@ -97,24 +96,18 @@ def write_result(output: OutputFolder, atlas: Atlas, asset: Asset, report: Mappi
     output.write(f"{title}.report.html", write)
 
 
-def write_compared(rows: Sequence[Compared], path: Path) -> None:
-    """Write the page of unwraps of one mesh that were asked for so many charts each.
+def write_compared(named: Sequence[tuple[str, Atlas, Asset, Mapping[str, Any]]], title: str, path: Path) -> None:
+    """Write the page of unwraps that are in no folder: a name, an atlas, its mesh and a report each.
 
     Raises: InputError where they are too much for one page.
     """
     settings = ReportSettings()
     found = [
-        reported(
-            f"at most {row.numbers['asked']}",
-            Shape.of_atlas(row.atlas, row.asset),
-            row.report,
-            path.parent,
-            settings.picture,
-        )
-        for row in rows
+        reported(name, Shape.of_atlas(atlas, asset), report, path.parent, settings.picture)
+        for name, atlas, asset, report in named
     ]
     _demand_room(found, settings)
-    write_page(found, f"{rows[0].asset.stem}, charts compared", path)
+    write_page(found, title, path)
 
 
 def before_of(asset: Asset, uv: NDArray[np.float64] | None, after: Result) -> list[Result]:

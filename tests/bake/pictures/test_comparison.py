@@ -52,7 +52,8 @@ def test_a_sheet_is_written_over_another_file_only_when_forced(found: Comparison
 
 
 def test_a_page_of_them_names_each_by_what_was_asked(found: Comparison, tmp_path: Path) -> None:
-    write_compared(found.rows, tmp_path / "compare.html")
+    named = [(f"at most {row.numbers['asked']}", row.atlas, row.asset, row.report) for row in found.rows]
+    write_compared(named, "mesh, charts compared", tmp_path / "compare.html")
     page = (tmp_path / "compare.html").read_text(encoding="utf-8")
     assert "mesh, charts compared" in page
     assert page.count("at most 1") >= 1
