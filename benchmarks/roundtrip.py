@@ -57,6 +57,13 @@ def seen_by_blender(python: Path, path: Path, folder: Path, export: Path | None 
     return {**arrays, "facts": json.loads(str(arrays["facts"]))}
 
 
+def has_normals(path: Path) -> bool:
+    """Whether the file itself holds normals, as it is read without any being made."""
+    from flexpara.runtime.io.meshfile import load_asset
+
+    return load_asset(path).normals is not None
+
+
 def held(seen: dict[str, Any]) -> str:
     """What is in a file, in a few words."""
     things = [thing for thing in seen["facts"]["objects"] if thing["type"] == "MESH"]
@@ -85,7 +92,8 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> str:
         turned = max(turned, float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).max(initial=0.0)))
         distance = np.linalg.norm(before[f"poses_{number}"] - after[f"poses_{number}"], axis=2)
         moved = max(moved, float(distance.max(initial=0.0)) / extent)
-    return "; ".join(wrong) or f"the same; normals {turned:.2g}°, poses {moved:.1g}"
+    own = " (the file has none: Blender's own before, flexpara's after)" if after["facts"].get("own_normals") else ""
+    return "; ".join(wrong) or f"the same; normals {turned:.2g}°{own}, poses {moved:.1g}"
 
 
 def _named(seen: dict[str, Any], what: str) -> Any:
@@ -130,6 +138,8 @@ def line_of(path: Path, python: Path, folder: Path, *, through: bool) -> Line:
     after = seen_by_blender(python, result, output)
     if isinstance(before, str) or isinstance(after, str):
         return Line(name, entry, "came back; " + (after if isinstance(after, str) else held(after)), validated(result))
+    if not has_normals(path):
+        after["facts"]["own_normals"] = True
     said = [text.partition("note: ")[2] for text in done.stderr.splitlines() if "note: " in text]
     return Line(name, entry, "; ".join([differences(before, after), *said])[:400], validated(result))
 

@@ -20,6 +20,7 @@ UNSAID = frozenset({"welded_vertices", "unreferenced_vertices", "components"})
 WORDS = {
     "coincident_faces": "{} lying on another kept, each side with uv of its own|face|faces",
     "degenerate_faces": "{} without area left out|face|faces",
+    "draco_undone": "Draco's compression of {} undone; compress the result again|primitive|primitives",
     "dropped_face_colors": "colours of {} left out, as the vertices have their own|face|faces",
     "dropped_normals": "normals of {} left out, as other parts have none|vertex|vertices",
     "faces_under_three_corners": "{} of under three corners left out|face|faces",
@@ -28,6 +29,7 @@ WORDS = {
     "flipped_faces": "{} turned to agree with the others around|face|faces",
     "flat_islands": "{} without area in uv left in one point|island|islands",
     "invalid_islands": "{} with triangles that overlap or are turned over, as in the file|island|islands",
+    "meshopt_undone": "meshopt's compression of {} undone; compress the result again|piece|pieces",
     "missing_materials": "{} of materials not found beside the mesh|file|files",
     "missing_textures": "{} not found or in a format that is not read|texture|textures",
     "missing_uv_or_normals": "{} referring to uv or normals that the file does not hold|corner|corners",
@@ -64,6 +66,8 @@ def lost(asset: Asset, outputs: Outputs) -> dict[str, int]:
     written, counts = set(outputs.formats), dict[str, int]()
     if asset.document is not None and written.isdisjoint(SCENES):
         counts |= asset.document.beyond_meshes()
+    if asset.document is not None and not written.isdisjoint(SCENES):
+        counts |= asset.document.compressed()
     if asset.obj is not None and "obj" not in written:
         counts |= asset.obj.beyond_meshes()
     if asset.obj is not None and "obj" in written:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .compression import DRACO, meshopt_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -59,3 +61,11 @@ class Document:
             "skipped_primitives": sum(primitive.get("mode", TRIANGLES) < TRIANGLES for primitive in primitives),
         }
         return {name: count for name, count in counts.items() if count}
+
+    def compressed(self) -> dict[str, int]:
+        """What is written without its compression: primitives of the parts by Draco, and all that meshopt packed."""
+        meshes = self.file.tree.get("meshes", [])
+        own = {(part.mesh, part.primitive) for part in self.parts}
+        draco = sum(DRACO in meshes[mesh]["primitives"][number].get("extensions", {}) for mesh, number in own)
+        meshopt = sum(meshopt_of(view) is not None for view in self.file.tree.get("bufferViews", []))
+        return {"draco_undone": draco, "meshopt_undone": meshopt}

@@ -7,10 +7,12 @@ faces their corners, colours, texcoord (uv per corner) and texnumber, whatever t
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import expit
 
 from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from .header import PlyHeader
 
 COLORS = ("red", "green", "blue", "alpha")
+HARMONIC = 0.5 / math.sqrt(math.pi)
+"""Value of the constant spherical harmonic."""
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 CORNERS = ("vertex_indices", "vertex_index")
 
@@ -108,7 +112,22 @@ def _colors(table: Table) -> NDArray[np.uint8] | None:
             scale = 65535.0 if kinds == {np.dtype("u2")} else 1.0 if {kind.kind for kind in kinds} == {"f"} else 255.0
             stacked = np.stack([to_float64(np.asarray(column)) for column in columns], axis=1) / scale
             return as_rgba(stacked)
-    return None
+    return _splat_colors(table)
+
+
+def _splat_colors(table: Table) -> NDArray[np.uint8] | None:
+    """(n, 4) uint8 sRGB of Gaussian splats: the first band of their harmonics, and opacity as alpha where there is one.
+
+    Kerbl et al. 2023 fit both against pictures as stored, the one as a factor of the constant harmonic around ½, the
+    other before a sigmoid.
+    """
+    first = _group(table, ("f_dc_0", "f_dc_1", "f_dc_2"))
+    if first is None:
+        return None
+    colors, opacity = 0.5 + HARMONIC * first, _group(table, ("opacity",))
+    if opacity is not None:
+        colors = np.hstack([colors, expit(opacity)])
+    return as_rgba(np.clip(colors, 0.0, 1.0))
 
 
 def _strips(table: Table, vertex_count: int) -> NDArray[np.int64]:

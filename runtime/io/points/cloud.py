@@ -96,12 +96,12 @@ def cloud_from_arrays(
     _check_positions(position)
     count = len(position)
     normal = None if normals is None else unit_vectors(to_float64(_columns("normals", normals, (3,), count)))
+    normal = normal if normal is not None and normal.any() else None  # splats write zeros
     color = None if colors is None else as_rgba(_columns("colors", colors, (3, 4), count))
     changes: dict[str, int] = {}
     if normal is not None:
         unknown = int(np.count_nonzero(~normal.any(axis=1)))
         changes = {"points_without_normal": unknown} if unknown else {}
-        normal = None if unknown == count else normal
     return PointCloud(position, normal, color, stem, sha256, changes)
 
 

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import MeshError, MissingDependencyError
+from flexpara.runtime.io.changes import lost
 from flexpara.runtime.io.gltf.compression import decode_draco, decode_view
 from flexpara.runtime.io.gltf.scene import read_gltf
+from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.options.unwrap import Outputs
 from flexpara.runtime.samples import make_sample
 
 DracoPy = pytest.importorskip("DracoPy")
@@ -117,3 +120,21 @@ def test_an_absent_library_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(__import__("sys").modules, "DracoPy", None)
     with pytest.raises(MissingDependencyError, match=r"flexpara\[formats\]"):
         decode_draco(b"", {})
+
+
+def test_compression_that_is_undone_is_named(tmp_path: Path) -> None:
+    packed = DracoPy.encode(SINGLE, FACES.astype(np.uint32), preserve_order=True)
+    extension = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    tree = {
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 1}, "indices": 0, "extensions": extension}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "accessors": accessors(),
+        "buffers": [{"byteLength": len(packed)}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(packed)}],
+        "extensionsRequired": ["KHR_draco_mesh_compression"],
+    }
+    (tmp_path / "packed.glb").write_bytes(glb(tree, packed))
+    asset = load_asset(tmp_path / "packed.glb")
+    assert lost(asset, Outputs(formats=("glb",), maps=())) == {"draco_undone": 1}
+    assert "draco_undone" not in lost(asset, Outputs(formats=("obj",), maps=()))
