@@ -67,6 +67,13 @@ def train(
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     opened = ball if wanted is None else cut_along(ball, wanted)
     finished = chart_surface(opened, config.charts, config.finish, config.seed, Stages(progress, deadline))
+    return with_networks(surface, finished, config, progress)
+
+
+def with_networks(surface: Surface, finished: Finished, config: TrainConfig, progress: Progress) -> Trained:
+    """Charts of a surface (source units) that were finished in its unit ball, and the networks that answer for them."""
+    frame = Frame.of(surface.vertices)
+    ball = Surface(frame.apply(surface.vertices), surface.faces)
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 from ..runtime.extras import requires
 from ..runtime.io.wantedseams import wanted_seams
 from ..runtime.mesh import Frame
+from .charts.kept import kept_islands
 from .cloud.config import CloudConfig
 from .cloud.reconstruct import reconstruct
 from .config import TrainConfig
 from .paper.config import Ablation, PaperConfig
-from .pipeline import train
+from .pipeline import train, with_networks
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,6 +44,11 @@ def train_asset(
 
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
+    if options.keep_islands:
+        config = fast_config(options)
+        with clock.stage("relax"):
+            finished = kept_islands(asset, config.finish)
+        return with_networks(asset.surface, finished, config, clock)
     if options.preset != "paper":
         wanted = wanted_seams(asset, options, options.crease_angle)
         return train(asset.surface, fast_config(options), clock, clock.deadline, wanted)

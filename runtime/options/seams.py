@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from .words import Names, demand, demand_known
+from .words import Flag, Names, demand, demand_known
 
 AUTO = "auto"
 MANY = 10_000
@@ -35,6 +35,8 @@ class SeamOptions:
     maps for games want it, or free."""
     keep_seams: Names = ()
     """Borders that stay seams: uv (those of the mesh's own uv), hard (hard edges), material.  New ones are added."""
+    keep_islands: Flag = False
+    """Keep the islands of the mesh's own uv as they are cut: only distortion inside them is lowered."""
     cut: Path | None = None
     """A text file of cuts to make: six numbers a line, two points; the shortest way along edges between the vertices
     nearest to them becomes a seam."""

@@ -1,0 +1,76 @@
+"""The islands of the uv that a mesh has, as charts: they stay, and only the distortion inside is lowered.
+
+Each is relaxed by SLIM from the very uv it has, in the unit ball of the surface.   f faces.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.errors import InputError
+from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.triangles import signed_areas
+from ...runtime.mesh import Frame, Surface
+from ...runtime.pack.config import IslandConfig
+from ...runtime.pack.exact.seamvertices import split_vertices
+from ...runtime.pack.islands import islands_of
+from ..finish.contact import boundary_edges, excess_energy, rim_overlaps
+from ..finish.pieces import Piece
+from ..finish.slits import Flat
+from .charts import Finished
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Asset
+    from ..config import FinishConfig
+
+
+def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
+    """The islands as finished charts, in the unit ball; a mirrored one is turned over.
+
+    Those whose triangles overlap or are turned over in the file stay as they are, and a sentence counts them: packing
+    cuts out what is not valid.
+    Raises: InputError where there are no uv, or an island has no area.
+    """
+    islands = islands_of(asset, equal=True, config=IslandConfig())
+    if islands.flat:
+        raise InputError(f"{islands.flat} islands of {asset.stem} have no area in uv, expected none; unwrap it anew")
+    frame = Frame.of(asset.surface.vertices)
+    ball = Surface(frame.apply(asset.surface.vertices), asset.surface.faces)
+    charts = islands.charts
+    total, pieces, broken = float(ball.face_areas().sum()), list[Piece](), 0
+    for number in range(len(charts.method)):
+        ids = np.flatnonzero(charts.face_chart == number)
+        flat = _as_flat(ball, ids, charts.corner_uv[ids] / frame.scale)
+        valid = _is_valid(flat)
+        broken += not valid
+        flat = _relaxed(flat, config) if valid else flat
+        pieces.append(Piece(ids, flat, excess_energy(flat.surface, flat.uv) / total, 0.0))
+    notes = (f"{broken} islands overlap or are turned over in the file and are not relaxed",) if broken else ()
+    return Finished(pieces, sum(piece.energy for piece in pieces), {"kept": len(pieces)}, notes)
+
+
+def _as_flat(ball: Surface, ids: NDArray[np.int64], corner_uv: NDArray[np.float64]) -> Flat:
+    """Faces with uv (m, 3, 2) of their corners, each vertex once for each uv it has; not mirrored."""
+    if signed_areas(corner_uv).sum() < 0.0:
+        corner_uv = corner_uv * (-1.0, 1.0)
+    faces, source, uv = split_vertices(ball.faces[ids], np.zeros(len(ids), np.int64), corner_uv)
+    return Flat(Surface(ball.vertices[source], faces), uv, {})
+
+
+def _is_valid(flat: Flat) -> bool:
+    faces = flat.surface.faces
+    flips = flipped_triangles(flat.uv[faces])
+    return not np.any(flips) and not rim_overlaps(faces, boundary_edges(faces), flat.uv)
+
+
+def _relaxed(flat: Flat, config: FinishConfig) -> Flat:
+    """The flattening with less distortion, where that leaves it valid."""
+    found = flat.relaxed(config.slit.contact)
+    better = np.isfinite(found.uv).all() and excess_energy(flat.surface, found.uv) < excess_energy(
+        flat.surface, flat.uv
+    )
+    return found if better and _is_valid(found) else flat
