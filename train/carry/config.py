@@ -75,6 +75,8 @@ class FineConfig:
     """… with so many rings around what is flipped …"""
     most_off: float = 0.02
     """… as long as no larger share goes with them."""
+    scrap: int = 200
+    """Faces of what was cut off at most, that it is tried to put on to a chart beside it."""
     contacts: int = 2
     """Steps more, in which what came to overlap is held where it was …"""
     hold: float = 1e3

@@ -35,6 +35,7 @@ from ..workers import parallel_map
 from .carry import fragments_joined, smoothed_in_band, votes
 from .hurried import crumbs_given, labels_at_once
 from .layout import carried_jacobians
+from .scraps import scraps_given
 from .sides import faces_beside
 
 if TYPE_CHECKING:
@@ -72,7 +73,8 @@ def refined(
     anew = State(surface, graph, config) if failed else None
     if anew is not None:
         anew.add_all_valid([(groups[number], sources[number].slits) for number in failed])
-    return [piece for of_one in found for piece in of_one] + ([] if anew is None else list(anew.pieces.values()))
+    charts = [of_one[0] for of_one in found if of_one] + ([] if anew is None else list(anew.pieces.values()))
+    return scraps_given(surface, charts, [scrap for of_one in found for scrap in of_one[1:]], config, late)
 
 
 def carried_groups(

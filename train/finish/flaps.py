@@ -122,9 +122,12 @@ def is_valid(flat: Flat, fresh: int) -> bool:
 
 def are_clear(uv: NDArray[np.float64], first: int, clear: float) -> bool:
     """True where no point from row ``first`` on lies upon an earlier one, up to a share ``clear`` of the extent."""
-    extent = float(np.ptp(uv, axis=0).max())
-    gaps = np.linalg.norm(uv[first:, None] - uv[None, :first], axis=2)
-    return bool((gaps > clear * extent).all())
+    gap, fresh, before = clear * float(np.ptp(uv, axis=0).max()), uv[first:], uv[:first]
+    if len(fresh) == 0:
+        return True
+    lowest, highest = fresh.min(axis=0) - gap, fresh.max(axis=0) + gap
+    near = before[((before >= lowest) & (before <= highest)).all(axis=1)]
+    return bool((np.linalg.norm(fresh[:, None] - near[None], axis=2) > gap).all())
 
 
 class _Layout:
