@@ -42,15 +42,15 @@ def scraps_given(
         beside = neighbours(surface, table, owner, scrap.ids)
         if late() or len(scrap.ids) > config.fine.scrap:
             beside = {}
-        taken = False
         for number, border in beside.items():
             found = attached(grown[number], surface, table, scrap.ids, replace(config.flaps, edges=1))
-            if taken := found is not None and dearer(found[1], scrap, total) < config.slit.price * border / total**0.5:
+            if found is not None and dearer(found[1], scrap, total) < config.slit.price * border / total**0.5:
                 ids, flat = found
                 grown[number] = replace(grown[number], ids=ids, flat=flat)
                 owner[scrap.ids] = number
                 break
-        left += [] if taken else [scrap]
+        else:
+            left.append(scrap)
     return [*(remeasured(surface, charts[n], grown[n], total) for n in sorted(grown)), *left]
 
 
