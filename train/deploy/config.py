@@ -21,8 +21,8 @@ class SampleConfig:
     """Samples beside seams for each unit of their length …"""
     beside: int = 120_000
     """… but at most this many in all."""
-    reach: float = 0.02
-    """Greatest distance of these from their seam."""
+    reach: float = 0.01
+    """Greatest distance of these from their seam, as a share of the side of a mean chart, √(area / charts)."""
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,8 @@ def spots_on(surface: Surface, charts: Charts, config: SampleConfig, rng: np.ran
     )
     seams = seams_of(surface, charts)
     count = min(int(config.along * seams.length.sum()), config.beside)
-    near = beside_seams(surface, seams, count, config.reach, rng)
+    side = float(np.sqrt(surface.face_areas().sum() / len(charts.method)))
+    near = beside_seams(surface, seams, count, config.reach * side, rng)
     return Spots(
         np.concatenate([spots.face, near.face]),
         np.concatenate([spots.barycentric, near.barycentric]),
