@@ -117,7 +117,10 @@ def judged(surface: Surface, corner_uv: NDArray[np.float64], evaluate: Evaluator
         "outside": int(((uv < 0.0) | (uv > 1.0)).any(axis=(1, 2)).sum()),
     }
     if evaluate is not None:
-        row |= beside(row, evaluate(solid.vertices, solid.faces, uv))
+        try:
+            row |= beside(row, evaluate(solid.vertices, solid.faces, uv))
+        except Exception as error:  # what another's evaluator can't do is said; the project's own numbers stand
+            row["evaluator_error"] = repr(error)
     row["charts_per_part"] = row["charts"] / parts
     row["objective"] = row["stretch"] - 1.0 + SEAM_PRICE * row["seam"]
     return row

@@ -101,6 +101,9 @@ def test_the_evaluator_from_outside_is_believed_in_defects_and_disagreement_is_n
     same = {"charts": 1, "symdir": 1.0, "seam_len": 0.0, "flips_n": 0, "uv_degenerate_n": 0}
     own = judged(*layout)
     assert beside(own, same)["disagreement"] == ""
+    broken = "def evaluate(*_, **__):\n    raise ValueError('no edges')\n"
+    found = judged(*layout, load_evaluator(str(text_file(tmp_path, "broken.py", broken))))
+    assert (found["evaluator_error"], found["stretch"]) == ("ValueError('no edges')", own["stretch"])
     assert load_evaluator("none") is None
     with pytest.raises(InputError, match="no evaluator at"):
         load_evaluator(str(tmp_path / "absent.py"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -113,8 +114,16 @@ def test_probes_lie_on_the_surface_and_in_the_ball(make_map: MapMaker) -> None:
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     height = np.abs(np.einsum("nfx,fx->nf", points[:, None] - corner[None, :, 0], normal)).min(axis=1)
-    assert 300 <= (height < 1e-5).sum() <= 310
-    assert (np.linalg.norm(points - np.asarray(made.frame.centre), axis=1) <= made.frame.scale * 1.0001).all()
+    assert 200 <= (height < 1e-5).sum() <= 210
+    assert (height < 0.02 * made.frame.scale).sum() >= 300
+    assert (np.linalg.norm(points - np.asarray(made.frame.centre), axis=1) <= made.frame.scale * 1.02).all()
+
+
+def test_probes_near_a_surface_are_no_ties_where_it_lies_in_the_plane_between_two_patches(make_map: MapMaker) -> None:
+    made = make_map()
+    flat = replace(made.atlas, positions=made.atlas.positions * [1.0, 1.0, 0.0])
+    points = probe_points(flat, made.frame, np.zeros(len(flat.faces), np.int64), 1000, seed=0)
+    assert 450 <= (np.abs(points[:, 2]) > 1e-4).sum() <= 500
 
 
 def test_probes_visit_a_patch_of_a_single_face(make_map: MapMaker) -> None:
@@ -125,7 +134,7 @@ def test_probes_visit_a_patch_of_a_single_face(make_map: MapMaker) -> None:
     corner = made.atlas.positions[made.atlas.faces[17]]
     normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
     height = np.abs((points - corner[0]) @ normal / np.linalg.norm(normal))
-    assert 30 <= (height < 1e-5).sum() <= 55
+    assert 20 <= (height < 1e-5).sum() <= 38
 
 
 def test_probes_are_the_same_for_the_same_seed(make_map: MapMaker) -> None:

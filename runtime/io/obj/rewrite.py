@@ -104,6 +104,8 @@ def _statements(text: ObjText, kinds: dict[int, str], faces: dict[int, list[str]
             yield from faces[index]
         elif kind == "l":
             yield " ".join(word.split("/")[0] for word in statement.split())
+        elif kind == "v" and len(statement.split()) == 3:
+            yield f"{statement} 0"  # readers expect three numbers
         else:
             yield statement
     yield from waiting

@@ -77,6 +77,12 @@ def test_a_polygon_without_area_is_left_out(tmp_path: Path) -> None:
     assert [line for line in written(asset, tmp_path, {}) if line.startswith("f")] == ["f 1/1/1 2/2/1 3/3/1"]
 
 
+def test_vertices_of_two_numbers_come_back_with_three(tmp_path: Path) -> None:
+    (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", encoding="utf-8")
+    asset = shaded(load_asset(tmp_path / "flat.obj"), 30.0)
+    assert [line for line in written(asset, tmp_path, {}) if line.startswith("v ")] == ["v 0 0 0", "v 1 0 0", "v 0 1 0"]
+
+
 def test_polygons_keep_positions_and_normals_and_get_the_new_uv(asset: Asset, tmp_path: Path) -> None:
     lines = written(asset, tmp_path, {})
     quad, triangle = (line.split()[1:] for line in lines if line.startswith("f "))
