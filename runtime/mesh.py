@@ -29,10 +29,12 @@ class Surface:
     vertices: (v, 3) float64, finite, each used by a face.
     faces: (f, 3) int64, no degenerate face; consistently oriented where that is possible.  Faces that lie on each other
     (second sides, copies) have vertices of their own at the same places.
+    polygon: (f,) int64, the same for faces that were one polygon in the file; None where that isn't known.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
+    polygon: NDArray[np.int64] | None = None
 
     @property
     def triangles(self) -> NDArray[np.float64]:

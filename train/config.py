@@ -73,15 +73,22 @@ class SliverConfig:
 
 @dataclass(frozen=True)
 class ShortenConfig:
-    """Charts too long for a page, cut across.  Lengths are shares of √(surface area)."""
+    """Charts that set the scale of the page, cut where that is cheap."""
 
-    above: float = 2.1
-    """Side of the square around a chart, straight or along its diagonal, above which it is cut: about a fifth of
-    such a page is covered, or less."""
-    to: float = 1.15
-    """Length of the parts it is cut in."""
-    shift: float = 0.25
-    """How far a cut may move along the chart to run where edges are shorter, as a share of a part's length."""
+    full: float = 0.5
+    """Share of a page that charts are expected to cover: one that needs more of a page costs something."""
+    worth: float = 0.005
+    """What a page e times as large costs, as objective: one half as full counts like a seam of 1.2 × √area."""
+    flat: float = 3.0
+    """How many times what it costs elsewhere a cut costs where the surface is flat: nobody expects one there."""
+    directions: int = 8
+    """Directions in which a straight cut is tried …"""
+    places: int = 7
+    """… at so many places each …"""
+    looks: int = 3
+    """… of which so many are moved to where edges are shortest."""
+    shift: float = 0.06
+    """How far a cut may be moved, as a share of the chart's extent across it."""
 
 
 @dataclass(frozen=True)

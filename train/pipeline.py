@@ -64,7 +64,7 @@ def train(
         FinishError: no valid charts could be made (a defect).
     """
     frame = Frame.of(surface.vertices)
-    ball = Surface(frame.apply(surface.vertices), surface.faces)
+    ball = replace(surface, vertices=frame.apply(surface.vertices))
     opened = ball if wanted is None else cut_along(ball, wanted)
     finished = chart_surface(opened, config.charts, config.finish, config.seed, Stages(progress, deadline))
     return with_networks(surface, finished, config, progress)

@@ -51,7 +51,9 @@ def train_asset(
         return with_networks(asset.surface, finished, config, clock)
     if options.preset != "paper":
         wanted = wanted_seams(asset, options, options.crease_angle)
-        return train(asset.surface, fast_config(options), clock, clock.deadline, wanted)
+        polygon = None if asset.polygons is None else asset.polygons.of_faces
+        surface = replace(asset.surface, polygon=polygon)
+        return train(surface, fast_config(options), clock, clock.deadline, wanted)
     with requires("train"):
         from .paper.batches import PaperInput
         from .paper.checkpoint import Checkpoints

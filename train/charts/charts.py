@@ -30,7 +30,7 @@ from .objective import objective, rank
 from .parts import Part, split_parts
 from .planar import flat_regions, least_seam
 from .proof import all_proven, is_valid
-from .shorten import shortened
+from .shorten import Page, shortened
 from .slivers import steadied
 from .starts import Starts, best_search
 from .tighten import back_on, is_asked, spent_fine, tightened
@@ -92,11 +92,10 @@ def chart_surface(
         part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
         starts = Starts(part, config.closing.charts, part.scale**2 / total, config, seed, scores, late)
         solved = solve_part(part.surface, charts, starts, config)
-        page = float(np.sqrt(total)) / part.scale
+        polygon = None if surface.polygon is None else surface.polygon[part.ids]
+        page = Page(float(np.sqrt(total)) / part.scale, charts, polygon)
         return (
-            solved
-            if config.stretch
-            else solved._replace(pieces=shortened(part.surface, solved.pieces, page, charts, config))
+            solved if config.stretch else solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
         )
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))

@@ -11,9 +11,10 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts.charts import chart_surface
-from flexpara.train.charts.shorten import along, shortened
+from flexpara.train.charts.shorten import Page, page_side, shortened
 from flexpara.train.config import FinishConfig
-from flexpara.train.finish.pieces import measured
+from flexpara.train.finish.contact import boundary_edges
+from flexpara.train.finish.pieces import Piece, measured
 from flexpara.train.finish.slits import Flat
 
 CONFIG = FinishConfig()
@@ -32,18 +33,15 @@ def charts_of(squares: int, most: int) -> list[np.ndarray]:
     return [piece.ids for piece in found.pieces]
 
 
-def test_a_chart_lies_along_its_longest_direction() -> None:
-    row = ribbon(6)
-    piece = measured(row, np.arange(12), Flat(row, row.vertices[:, :2], {}), 6.0)
-    place, length = along(piece)
-    assert length == pytest.approx(6.0, rel=0.01)
-    assert np.sort(np.minimum(place, 1.0 - place)).max() <= 0.5
-    assert np.ptp(place) == pytest.approx((6.0 - 2.0 / 3.0) / 6.0, rel=0.01)
+def border(piece: Piece) -> float:
+    ends = piece.flat.uv[boundary_edges(piece.flat.surface.faces)]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
 def test_a_long_ribbon_is_cut_across_its_squares() -> None:
     charts = charts_of(30, 8)
-    assert len(charts) == int(np.ceil(np.sqrt(30.0) / CONFIG.shorten.to))
+    assert len(charts) > 2
+    assert max(map(len, charts)) <= 2 * np.sqrt(60.0) / CONFIG.shorten.full
     for ids in charts:  # a square's triangles are ids n and n + 30
         assert sorted(ids[ids < 30].tolist()) == sorted((ids[ids >= 30] - 30).tolist())
 
@@ -60,12 +58,44 @@ def test_a_part_gets_no_more_charts_than_asked_for() -> None:
 def test_the_page_is_that_of_the_whole_surface() -> None:
     row = ribbon(30)
     piece = measured(row, np.arange(60), Flat(row, row.vertices[:, :2], {}), 1.0)
-    assert len(shortened(row, [piece], 20.0, 8, CONFIG)) == 1
-    assert len(shortened(row, [piece], 5.0, 8, CONFIG)) > 1
+    assert len(shortened(row, [piece], Page(20.0, 8), CONFIG)) == 1
+    assert len(shortened(row, [piece], Page(5.0, 8), CONFIG)) > 1
+
+
+def test_arms_that_branch_are_cut_off_where_they_are_narrow() -> None:
+    """A cross of four arms, ten long and one wide: cut at the joint, never along an arm."""
+    rows = [(x, 0) for x in range(-10, 11)] + [(0, y) for y in range(-10, 11) if y]
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    places, index = np.unique((np.array(rows)[:, None] + corner).reshape(-1, 2), axis=0, return_inverse=True)
+    quads = index.reshape(-1, 4)
+    vertices = np.column_stack([places, np.zeros(len(places))]).astype(np.float64)
+    cross = Surface(vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    piece = measured(cross, np.arange(len(cross.faces)), Flat(cross, cross.vertices[:, :2], {}), 1.0)
+    found = shortened(cross, [piece], Page(float(np.sqrt(len(rows))), 8), CONFIG)
+    assert len(found) >= 2
+    assert max(page_side(part.flat.uv) for part in found) < 0.8 * page_side(piece.flat.uv)
+    added = sum(map(border, found)) - border(piece)
+    assert added <= 2.0 * np.sqrt(2.0) * (len(found) - 1) + 1e-9
+
+
+def test_a_polygon_is_never_cut() -> None:
+    """A ring of 40 squares, each of two triangles: as a single polygon it stays whole, as squares it is cut between."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=1)
+    a, b = np.arange(40), np.roll(np.arange(40), -1)
+    faces = np.concatenate([np.stack([a, a + 40, b + 40], 1), np.stack([a, b + 40, b], 1)])[:78]
+    ring = Surface(np.concatenate([rim, 1.05 * rim]), faces)
+    piece = measured(ring, np.arange(78), Flat(ring, ring.vertices[:, :2], {}), 1.0)
+    side = float(np.sqrt(ring.face_areas().sum()))
+    assert len(shortened(ring, [piece], Page(side, 8, np.zeros(78, np.int64)), CONFIG)) == 1
+    squares = np.arange(78) % 40
+    found = shortened(ring, [piece], Page(side, 8, squares), CONFIG)
+    assert len(found) > 1
+    assert sum(len(np.unique(squares[part.ids])) for part in found) == 40
 
 
 def test_a_knotted_tube_is_no_longer_than_its_page_allows() -> None:
     knot = Surface(*make_sample("trefoil", resolution=24))
     found = chart_surface(knot, 8, CONFIG, 0, Stages())
     page = np.sqrt(knot.face_areas().sum())
-    assert max(along(piece)[1] for piece in found.pieces) < CONFIG.shorten.above * page
+    assert max(page_side(piece.flat.uv) for piece in found.pieces) < 1.5 * page
