@@ -79,8 +79,14 @@ class ShortenConfig:
     """Share of a page that charts are expected to cover: one that needs more of a page costs something."""
     worth: float = 0.005
     """What a page e times as large costs, as objective: one half as full counts like a seam of 1.2 × √area."""
-    flat: float = 3.0
-    """How many times what it costs elsewhere a cut costs where the surface is flat: nobody expects one there."""
+    smooth: float = 3.0
+    """How many times what it costs elsewhere a cut costs where nobody expects one: where the surface is flat …"""
+    exact: float = 1e-6
+    """… and in a chart of no more excess energy, which unrolls as it is, …"""
+    crease: float = 1.05
+    """… wherever it is bent by less than so many radians."""
+    least: float = 0.001
+    """Gain, as objective, below which a chart stays whole."""
     directions: int = 8
     """Directions in which a straight cut is tried …"""
     places: int = 7

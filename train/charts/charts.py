@@ -151,10 +151,11 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     asked = is_asked(found, charts, config)
     if not starts.late():
         found = tightened(found, charts, config, starts.late) if asked else found
-        found = straightened(found, config.bands)
+        found = found if starts.holed else straightened(found, config.bands)
     pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late, asked=asked)
-    if exact is not None and rank(exact.pieces, surface, charts, config) <= rank(pieces, surface, charts, config):
-        return exact
+    facets = exact.pieces if exact is not None and exact.way == "facets" else []
+    if facets and rank(facets, surface, charts, config) <= rank(pieces, surface, charts, config):
+        return Solved(facets, "facets")
     energy = sum(piece.energy for piece in pieces)
     if energy > config.resort_excess and not starts.late():
         resort = unwrapped_by_xatlas(surface, np.arange(len(surface.faces)), 1.0)
@@ -195,7 +196,8 @@ def brought_back(
 def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:
     """A part made of flat facets, unfolded: "unfolded" where that is the answer, "facets" where it is one among others.
 
-    None where too little of it is flat.  A plate with more holes than charts were asked for can't do with those: the
+    None where too little of it is flat; "overlapping" where some of it lies over itself, which is no more than a start.
+    A plate with more holes than charts were asked for can't do with those: the
     side of each hole is one.
     """
     table = edge_table(surface.faces)
@@ -211,7 +213,7 @@ def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishCon
     answer = len(found) <= min(config.planar.few, charts) or (faceted and (len(found) <= charts or handles >= charts))
     pieces = [as_piece(surface, development) for development in found]
     if not all(is_valid(piece) for piece in pieces):
-        return None
+        return Solved(pieces, "overlapping")
     return Solved(pieces, "unfolded" if answer else "facets")
 
 

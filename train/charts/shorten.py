@@ -86,7 +86,8 @@ def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut |
         return None
     flat = piece.flat.surface
     polygon = np.arange(len(flat.faces)) if page.polygon is None else page.polygon[piece.ids]
-    graph = graph_of(flat, polygon, config)
+    exact = piece.energy <= config.shorten.exact
+    graph = graph_of(flat, polygon, config.shorten.crease if exact else config.planar.bent, config)
     price, corners = config.slit.price / page.side, piece.flat.uv[flat.faces]
     rim = np.isin(flat.faces, boundary_edges(flat.faces)).any(axis=1)
 
@@ -103,19 +104,18 @@ def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut |
     rough = [cut((place > 0.0).astype(np.int64)).gain for place in places]
     best = np.argsort(-np.asarray(rough), kind="stable")[: config.shorten.looks]
     found = [cut(_smooth(places[at], graph, config.shorten)) for at in best.tolist()]
-    paying = [each for each in found if each.gain > 0.0 and 0 < each.part.max() < room]
+    paying = [each for each in found if each.gain > config.shorten.least and 0 < each.part.max() < room]
     return max(paying, key=lambda each: each.gain, default=None)
 
 
-def graph_of(flat: Surface, polygon: NDArray[np.int64], config: FinishConfig) -> DualGraph:
-    """The dual graph of a chart (m faces): cuts through flat places cost more, those through polygons all."""
+def graph_of(flat: Surface, polygon: NDArray[np.int64], bent: float, config: FinishConfig) -> DualGraph:
+    """The dual graph of a chart (m faces): a cut costs more where the surface is bent less, and all within polygons."""
     graph, normal = dual_graph(flat, edge_table(flat.faces), config.labels.seams), flat.face_normals()
     first, second = graph.pairs.T
-    is_flat = np.einsum("md,md->m", normal[first], normal[second]) > np.cos(config.planar.bent)
-    dear = np.where(is_flat, config.shorten.flat, 1.0)
-    return DualGraph(
-        graph.pairs, graph.length * dear, np.where(polygon[first] == polygon[second], WALL, graph.cost * dear)
-    )
+    is_smooth = np.einsum("md,md->m", normal[first], normal[second]) > np.cos(bent)
+    dear = np.where(is_smooth, config.shorten.smooth, 1.0)
+    cost = np.where(polygon[first] == polygon[second], WALL, graph.cost * dear)
+    return DualGraph(graph.pairs, graph.length * dear, cost)
 
 
 def straight_cuts(corners: Corners, polygon: NDArray[np.int64], config: ShortenConfig) -> Iterator[NDArray[np.float64]]:

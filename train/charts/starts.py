@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..search.search import Search
 from ..search.starts import clusters, pieces_by_score
 from ..workers import parallel_map
 from .objective import rank
+from .proof import is_valid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -66,6 +68,11 @@ class Starts:
         return self.share < self.config.start.worth
 
     @property
+    def holed(self) -> bool:
+        """Whether the part is a small share of the surface, and has so many handles that straight seams take long."""
+        return self.small and self.handles > self.config.start.handles
+
+    @property
     def counts(self) -> tuple[float, ...]:
         """Clusters of each start, as a multiple of the charts asked for."""
         start = self.config.start
@@ -94,11 +101,14 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     begun = []
     if unfolded:
         search = Search(surface, graph, config)
-        for piece in unfolded:
+        valid = [is_valid(piece) for piece in unfolded]
+        for piece in compress(unfolded, valid):
             search.add(piece)
+        search.add_all_valid([(piece.ids, ()) for piece, whole in zip(unfolded, valid, strict=True) if not whole])
         search.begin(starts.late)
         begun.append(search)
-    begun += begun_searches(surface, graph, starts, starts.counts)
+    if not unfolded or starts.share >= config.start.main:
+        begun += begun_searches(surface, graph, starts, starts.counts)
     if starts.small and min(search.energy() for search in begun) > config.most_excess:
         begun += begun_searches(surface, graph, starts, config.start.counts)
     by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one

@@ -53,7 +53,7 @@ def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]
 
 
 def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Each inner vertex at the mean of its neighbours; the loop (b,) at boundary (b, 2)."""
+    """Each inner vertex at the mean of its neighbours; the loop (b,) at boundary (b, 2); NaN where none leads to it."""
     count = len(surface.vertices)
     a = surface.faces.reshape(-1)
     b = np.roll(surface.faces, -1, axis=1).reshape(-1)
@@ -68,7 +68,10 @@ def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.fl
     uv[loop] = boundary
     if len(inner):
         rows = laplacian.tocsr()[inner]
-        uv[inner] = splu(rows[:, inner].tocsc()).solve(-(rows[:, loop] @ boundary))
+        try:
+            uv[inner] = splu(rows[:, inner].tocsc()).solve(-(rows[:, loop] @ boundary))
+        except RuntimeError:  # SuperLU's word for a singular system: something inside hangs on nothing of the loop
+            uv[inner] = np.nan
     return uv
 
 
