@@ -92,7 +92,7 @@ def with_networks(surface: Surface, finished: Finished, config: TrainConfig, pro
 def cut_along(surface: Surface, wanted: NDArray[np.bool_]) -> Surface:
     """The surface, its faces in their order, open along edges (e,) of its table."""
     faces, old = split_non_manifold_vertices(surface.faces, wanted, edge_table(surface.faces))
-    return Surface(surface.vertices[old], faces)
+    return replace(surface, vertices=surface.vertices[old], faces=faces)
 
 
 def as_charts(surface: Surface, finished: Finished) -> Charts:
