@@ -104,6 +104,12 @@ def _rows(mesh: Mesh) -> NDArray[np.int32]:
     return values
 
 
+def write_cuts(ends: NDArray[np.float64], path: Path) -> None:
+    """Write the ends (s, 2, 3) of edges to be cut, one edge a line, as flexpara unwrap --cut reads them."""
+    lines = (" ".join(map(repr, row)) for row in ends.reshape(-1, 6).tolist())
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
 def read_answer(path: Path, mesh: Mesh) -> Answer:
     """The uv of each loop, out of an npz file that flexpara wrote of the mesh."""
     with np.load(path, allow_pickle=False) as found:

@@ -99,6 +99,14 @@ def mark(entry: Chosen, uv: NDArray[np.float32]) -> NDArray[np.int64]:
     return found
 
 
+def marked_edges(entry: Chosen) -> NDArray[np.float64]:
+    """(s, 2, 3) where the ends of the chosen polygons' edges lie that are Blender's seams, in the world."""
+    data = entry.thing.data
+    edges = np.unique(column(data.loops, "edge_index", np.int32)[entry.loops])
+    marked = edges[column(data.edges, "use_seam", bool)[edges]]
+    return entry.mesh.positions[column(data.edges, "vertices", np.int32, 2)[marked]]
+
+
 def show_seams(entry: Chosen) -> None:
     """The edges at which the uv of the chosen polygons part, as Blender's seams and as an attribute."""
     data = entry.thing.data

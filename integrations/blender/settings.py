@@ -31,6 +31,9 @@ class UnwrapSettings:
     selected_only: bpy.props.BoolProperty(
         name="Selected Faces", default=False, description="In edit mode, the selected faces only"
     )
+    keep_seams: bpy.props.BoolProperty(
+        name="Keep Seams", default=False, description="Edges marked as seams before stay seams; new ones are added"
+    )
     mark_seams: bpy.props.BoolProperty(name="Mark Seams", default=True, description="Seams become Blender's seams")
 
 

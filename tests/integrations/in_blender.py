@@ -193,6 +193,22 @@ def selected_faces() -> None:
     assert changed.tolist() == [False, True, True, False, False, False]
 
 
+def kept_seams() -> None:
+    """A ring marked around a torus, where no seam would pay, stays one."""
+    empty()
+    bpy.ops.mesh.primitive_torus_add(major_segments=24, minor_segments=12)
+    thing = bpy.context.object
+    corners = np.array([vertex.co for vertex in thing.data.vertices])
+    ring = np.flatnonzero((np.abs(corners[:, 1]) < 1e-5) & (corners[:, 0] > 0.0))
+    marked = [edge.index for edge in thing.data.edges if set(edge.vertices) <= set(ring.tolist())]
+    assert len(marked) == 12
+    for edge in marked:
+        thing.data.edges[edge].use_seam = True
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2, keep_seams=True) == {"FINISHED"}
+    assert all(thing.data.edges[edge].use_seam for edge in marked)
+    assert seams_are_where_uv_part(thing)
+
+
 def evaluate_and_bake() -> None:
     """Charts and distortion become attributes, numbers are kept, maps become packed pictures."""
     empty()
@@ -254,7 +270,7 @@ def in_background(operators: Any) -> None:
     picked(bpy.context.object)
     kind = operators.FLEXPARA_OT_unwrap
     settings = {"charts": 8, "max_stretch": 0.0, "time_budget": 0.0, "size": 256, "padding": 2, "seed": 0}
-    settings |= {"selected_only": False, "mark_seams": True}
+    settings |= {"selected_only": False, "keep_seams": False, "mark_seams": True}
     methods = {name: getattr(kind, name) for name in ("words", "take", "with_uv")}
     told: list[Any] = []
     command, shown = type("Unwrap", (operators.InProcess,), methods | settings)(), window.Window()
@@ -296,7 +312,7 @@ def main(folder: str, program: str) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     cube()
     seconds = suzanne()
-    for check in (modifiers, several, selected_faces, evaluate_and_bake):
+    for check in (modifiers, several, selected_faces, kept_seams, evaluate_and_bake):
         check()
     overlays()
     lines = sidebar(extension)

@@ -120,6 +120,12 @@ def test_some_polygons_and_several_meshes(house: Any) -> None:
     assert both.uv is None
 
 
+def test_cuts_are_written_as_they_are_read(tmp_path: Path) -> None:
+    ends = np.array([[[0.1, 0.0, 0.0], [1.0, 2.0, 1e-9]], [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]])
+    exchange.write_cuts(ends, tmp_path / "cuts.txt")
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "cuts.txt").reshape(-1, 2, 3), ends)
+
+
 def test_a_process_is_watched_asked_and_its_error_is_told() -> None:
     talk = "import sys; print('flexpara: progress: charts 3/4', file=sys.stderr); print('done')"
     run = child.Run(sys.executable, ["-c", talk])
