@@ -36,11 +36,13 @@ class Job:
         return hashlib.sha256(json.dumps(facts, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
     def content(self) -> str:
-        """A fingerprint of the file; empty where it can't be read."""
+        """A fingerprint of the file; empty where it can't be read, or is a device that has no end."""
         try:
+            if not self.run.mesh.is_file():
+                return ""
             with self.run.mesh.open("rb") as file:
                 return hashlib.file_digest(file, "sha256").hexdigest()
-        except OSError:
+        except (OSError, ValueError):  # a name that no file can have
             return ""
 
 
@@ -61,6 +63,7 @@ def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: O
         found |= _listed(path, options, outputs) if path.suffix in LISTS else _found(path, options, outputs)
     # results of an earlier run, where they lie in the folder that is searched
     found = {path: entry for path, entry in found.items() if output.absolute() not in path.parents}
+    found = {path: (printable(name), *rest) for path, (name, *rest) in found.items()}
     stems = Counter(str(Path(name).with_suffix("")) for name, _, _ in found.values())
     jobs = []
     for path, (name, own_options, own_outputs) in found.items():
@@ -68,6 +71,11 @@ def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: O
         folder = output.absolute() / (stem if stems[stem] == 1 else name)
         jobs.append(Job(name, Run(path, folder, own_options, own_outputs)))
     return sorted(jobs, key=lambda job: job.name)
+
+
+def printable(name: str) -> str:
+    """A name as a terminal, a page and the manifest can show it: what controls those, or is no text, is spelled out."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in name)
 
 
 def _found(path: Path, options: Options, outputs: Outputs) -> dict[Path, tuple[str, Options, Outputs]]:

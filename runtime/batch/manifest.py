@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import asdict, dataclass, field
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -22,6 +23,14 @@ if TYPE_CHECKING:
 
 FORMAT = "flexpara-batch-1"
 LARGEST_LINE = 1 << 20
+
+
+LARGEST_NUMBER = 1e300
+KINDS = dict.fromkeys(("asset", "status", "content", "asked", "folder", "error"), "text")
+KINDS |= dict.fromkeys(("seconds", "memory", "elapsed"), "number")
+KINDS |= {"stages": "table of number", "metrics": "table of measure"}
+KINDS |= {"files": "table of text", "notes": "list of text", "again": "flag"}
+"""What each field holds."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +73,7 @@ def read_entries(path: Path) -> dict[str, Entry]:
         if not line.strip():
             continue
         try:
-            facts = json.loads(line)
-            entry = Entry(**facts)
-            if entry.format != FORMAT:
-                raise ValueError(f"format {entry.format!r}")
+            entry = entry_of(json.loads(line))
         except (ValueError, TypeError, RecursionError) as error:
             if number == len(lines):  # cut short by a kill
                 continue
@@ -76,6 +82,33 @@ def read_entries(path: Path) -> dict[str, Entry]:
             ) from error
         found[entry.asset] = entry
     return found
+
+
+def entry_of(facts: dict[str, Any]) -> Entry:
+    """The entry of a line: it may come from anyone.  Raises: ValueError, TypeError where flexpara did not write it."""
+    entry = Entry(**facts)
+    if entry.format != FORMAT:
+        raise ValueError(f"format {str(entry.format)[:60]!r}")
+    for name, kind in KINDS.items():
+        if not fits(getattr(entry, name), kind):
+            raise ValueError(f"{name} is {str(getattr(entry, name))[:60]!r}")
+    if any(part in ("..", "/") for part in (*PurePath(entry.folder).parts, *entry.files)):
+        raise ValueError(f"folder {entry.folder[:60]!r} leads elsewhere")
+    return entry
+
+
+def fits(value: object, kind: str) -> bool:
+    """Whether a value of JSON is a "number", a "measure" (null for none), a "text", a "flag", or several of those."""
+    if kind.startswith("table of "):
+        return isinstance(value, dict) and all(fits(each, kind[9:]) for each in value.values())
+    if kind.startswith("list of "):
+        return isinstance(value, list) and all(fits(each, kind[8:]) for each in value)
+    if kind in ("number", "measure"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return (value is None and kind == "measure") or (number and abs(value) < LARGEST_NUMBER)
+    if kind == "text":
+        return isinstance(value, str) and value == value.encode("utf-8", "replace").decode()
+    return isinstance(value, bool)
 
 
 def append(path: Path, entry: Entry) -> None:

@@ -86,13 +86,17 @@ def _total(plan: Path) -> int:
 
 def write_page(output: Path, status: Status) -> Path:
     """The page of thumbnails, sortable by its heads, whole or not at all; it needs no network."""
+    replace_file(output / PAGE, page_of(output, status).encode())
+    return output / PAGE
+
+
+def page_of(output: Path, status: Status) -> str:
+    """The text of the page."""
     heads = ("", "asset", "status", "charts", "stretch", "seam", "packing", "seconds", "MB", "error")
     head = "".join(f'<th scope="col"><button>{name}</button></th>' if name else "<th></th>" for name in heads)
     rows = "\n".join(_row(output, entry) for entry in status.entries)
     counted = f"{len(status.done)} of {status.total} done"
-    text = TEMPLATE.replace("@COUNTED@", counted).replace("@HEAD@", head).replace("@ROWS@", rows)
-    replace_file(output / PAGE, text.encode())
-    return output / PAGE
+    return TEMPLATE.replace("@COUNTED@", counted).replace("@HEAD@", head).replace("@ROWS@", rows)
 
 
 def _row(output: Path, entry: Entry) -> str:

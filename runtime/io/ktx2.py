@@ -15,11 +15,13 @@ from .limits import limits
 from .pictures import demand_texels
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
 
-def decode_ktx2(data: bytes) -> NDArray[np.uint8]:
-    """The largest level of a KTX 2 file: (h, w, 4) uint8 as stored, row 0 = top.
+def decode_ktx2(data: bytes, beside: Iterable[NDArray[np.uint8]] = ()) -> NDArray[np.uint8]:
+    """The largest level of a KTX 2 file: (h, w, 4) uint8 as stored, row 0 = top.  beside: as decode_image.
 
     Raises:
         MeshError: damaged, not of Basis Universal, of high dynamic range, or of more texels than are read.
@@ -30,7 +32,7 @@ def decode_ktx2(data: bytes) -> NDArray[np.uint8]:
 
     try:
         texture = opengl_basisu.open(data)
-        demand_texels(texture.width, texture.height)
+        demand_texels(texture.width, texture.height, beside)
         limits().demand_unpacked(4 * texture.width * texture.height, len(data), "a texture")
         return np.ascontiguousarray(texture.transcode(opengl_basisu.Target.RGBA8).data, dtype=np.uint8)
     except opengl_basisu.BasisuError as error:

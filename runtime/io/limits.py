@@ -11,6 +11,8 @@ from dataclasses import dataclass, fields
 
 from ..errors import InputError, MeshError
 
+TEXTURES = 4
+"""Largest textures that all of a file may come to together."""
 VARIABLE = "FLEXPARA_LIMITS"
 FREE = 64 << 20
 """Bytes that may be unpacked of a file however small it is."""

@@ -15,9 +15,10 @@ import numpy as np
 from PIL import Image
 
 from ..errors import MeshError
-from .limits import limits, raised
+from .limits import TEXTURES, limits, raised
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -54,13 +55,14 @@ def inside(folder: Path, name: str) -> Path | None:
         return None
 
 
-def decode_image(data: bytes) -> NDArray[np.uint8]:
-    """Picture file → (h, w, 4) uint8 sRGB, row 0 = top.
+def decode_image(data: bytes, beside: Iterable[NDArray[np.uint8] | None] = ()) -> NDArray[np.uint8]:
+    """Picture file → (h, w, 4) uint8 sRGB, row 0 = top.  beside: pictures of the same file that are read already.
 
     Raises: MeshError for bytes that are no picture, or more texels than are read.
     """
     try:
         with _opened(data) as image:
+            demand_texels(image.width, image.height, beside)
             limits().demand_unpacked(4 * image.width * image.height, len(data), "a texture")
             return picture_pixels(image)
     except MeshError:
@@ -78,12 +80,16 @@ def _opened(data: bytes) -> Image.Image:
         Image.MAX_IMAGE_PIXELS = theirs
 
 
-def demand_texels(width: int, height: int) -> None:
-    """Raises: MeshError for a texture of more texels than the limits in force allow."""
+def demand_texels(width: int, height: int, beside: Iterable[NDArray[np.uint8] | None] = ()) -> None:
+    """Raises: MeshError for a texture of more texels than the limits in force allow, alone or with those beside it."""
     most = limits().texels
     if width * height > most:
         remedy = f"scale it down, or {raised('texels')}"
         raise MeshError(f"a texture has {width} × {height} pixels, at most {most} are read; {remedy}")
+    together = width * height + sum(picture.shape[0] * picture.shape[1] for picture in beside if picture is not None)
+    if together > TEXTURES * most:
+        found = f"the textures of a file have more than {TEXTURES * most} pixels together, expected fewer"
+        raise MeshError(f"{found}; scale them down, or {raised('texels')}")
 
 
 def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:

@@ -138,6 +138,17 @@ def by_json(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
     return json_text(rng, json.loads(pick(rng, seeds)))
 
 
+def by_lines(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
+    """A file of JSON lines, one of which has other values, or is left out, doubled or cut."""
+    lines = pick(rng, seeds).splitlines()
+    place = int(rng.integers(len(lines)))
+    if rng.random() < 0.8:
+        lines[place] = json_text(rng, json.loads(lines[place]))
+    else:
+        lines[place : place + 1] = [lines[place]] * int(rng.integers(0, 4))
+    return b"\n".join(lines) + (b"\n" if rng.random() < 0.8 else b"")
+
+
 def by_glb(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
     """A GLB file whose JSON has other values, or whose binary chunk is damaged; its lengths are right."""
     data = pick(rng, seeds)
@@ -191,6 +202,14 @@ def by_png(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
         struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in parts
     )
     return data[:8] + b"".join(packed)
+
+
+def by_header(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
+    """A safetensors file whose header has other values."""
+    data = pick(rng, seeds)
+    size = int.from_bytes(data[:8], "little")
+    text = json_text(rng, json.loads(data[8 : 8 + size]))
+    return len(text).to_bytes(8, "little") + text + data[8 + size :]
 
 
 def by_safetensors(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from . import mutate
 from .mutate import Mutator, by_bytes, by_words, glb, in_turn
 from .onnxcases import by_onnx
 
+TENSORS = "checkpoint-00000005.safetensors"
 Files = Mapping[str, bytes]
 
 
@@ -108,6 +110,40 @@ def read_run(path: Path) -> object:
     return find_run(path.parent.parent)
 
 
+def read_batch(path: Path) -> object:
+    """As `batch --status`, and a batch that goes on, read what an earlier one wrote."""
+    from flexpara.runtime.batch.status import page_of, status_of
+
+    status = status_of(path.parent)
+    return status.lines(), page_of(path.parent, status).encode()
+
+
+def read_list(path: Path) -> object:
+    """As `batch` reads a list of assets."""
+    from flexpara.runtime.batch.jobs import find_jobs
+    from flexpara.runtime.options.unwrap import Options, Outputs
+
+    return [job.asked("1") for job in find_jobs([path], path.parent / "out", Options(), Outputs())]
+
+
+def read_checkpoint(path: Path) -> object:
+    """As a run of preset paper goes on from it."""
+    from flexpara.train.paper.checkpoint import resume
+
+    return resume(path.parent)
+
+
+def _with_tensors(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+    return {"run/checkpoint.json": data, f"run/{TENSORS}": seeds["tensors"][0]}
+
+
+def _with_manifest(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+    """Damaged tensors whose size and hash are told right."""
+    facts = json.loads(seeds["checkpoint"][0])
+    facts["tensors"] |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    return {"run/checkpoint.json": json.dumps(facts).encode(), f"run/{TENSORS}": data}
+
+
 def _with_library(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
     return {"a.obj": seeds["obj"][0], "box.mtl": data, "skin.png": seeds["png"][0]}
 
@@ -178,6 +214,14 @@ def _packed(data: bytes, views: list[dict[str, object]], where: list[dict[str, i
     return glb(json.dumps(tree).encode(), data)
 
 
+def _batch(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+    return {"manifest.jsonl": data, "batch.json": seeds["plan"][0]}
+
+
+def _batch_plan(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
+    return {"manifest.jsonl": seeds["manifest"][0], "batch.json": data}
+
+
 def _trained(data: bytes, seeds: Mapping[str, list[bytes]]) -> Files:
     return {"box.trained.safetensors": data, "box.obj": seeds["boxobj"][0]}
 
@@ -214,5 +258,12 @@ READERS: dict[str, Reader] = {
         _trained,
     ),
     "report": Reader("box.report.json", in_turn(mutate.by_json, by_bytes), read_report, _report),
+    "manifest": Reader("manifest.jsonl", in_turn(mutate.by_lines, by_bytes), read_batch, _batch),
+    "plan": Reader("batch.json", in_turn(mutate.by_json, by_bytes), read_batch, _batch_plan),
+    "list": Reader("assets.jsonl", in_turn(mutate.by_lines, by_bytes), read_list),
+    "checkpoint": Reader(
+        "run/checkpoint.json", in_turn(mutate.by_json, mutate.by_json, by_bytes), read_checkpoint, _with_tensors
+    ),
+    "tensors": Reader(f"run/{TENSORS}", in_turn(mutate.by_header, by_bytes), read_checkpoint, _with_manifest),
     "run": Reader("mesh.checkpoint/run.json", in_turn(mutate.by_json, by_bytes), read_run),
 }

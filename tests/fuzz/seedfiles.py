@@ -12,6 +12,7 @@ from pathlib import Path
 import DracoPy
 import meshoptimizer
 import numpy as np
+import torch
 import trimesh
 from PIL import Image
 from trimesh.exchange.gltf import export_gltf
@@ -20,8 +21,11 @@ import flexpara
 from flexpara.__main__ import main
 from flexpara.runtime.options.unwrap import Options, Outputs
 from flexpara.runtime.runfile import Run
+from flexpara.train.paper.checkpoint import Checkpoints, State
+from flexpara.train.paper.config import PaperConfig, PaperNets
 
 from .mutate import glb
+from .readers import TENSORS
 
 FOUND = Path(__file__).parent / "seeds"
 CORPUS = Path(__file__).resolve().parents[3] / "shared" / "corpus"
@@ -158,6 +162,11 @@ def corpus(*endings: str) -> list[bytes]:
     return [path.read_bytes() for path in paths if path.is_file() and path.stat().st_size < LARGEST][:12]
 
 
+LIST = b"""{"file": "a.obj"}
+{"file": "b/c.obj", "options": {"charts": 3, "maps": "ao", "size": 64, "rotation": "off"}}
+"""
+
+
 def unwrapped() -> dict[str, list[bytes]]:
     """What flexpara itself writes and reads: the networks, what training found, the report, a run."""
     with tempfile.TemporaryDirectory() as place, contextlib.redirect_stdout(io.StringIO()):
@@ -167,6 +176,11 @@ def unwrapped() -> dict[str, list[bytes]]:
         main(["train", str(folder / "box.obj"), "-o", str(folder / "out"), "--quiet"])
         Run(folder / "mesh.obj", folder / "run", Options(preset="paper"), Outputs(), 5).save()
         files = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+        main(["batch", str(folder / "box.obj"), "-o", str(folder / "batch"), "--maps", "none", "--quiet"])
+        ledger, plan = ((folder / "batch" / name).read_bytes() for name in ("manifest.jsonl", "batch.json"))
+        config = PaperConfig(nets=PaperNets(hidden=16))
+        Checkpoints(folder / "kept").save(State(5, {"networks.a": torch.ones(16, 128)}), config, "0" * 64)
+        checkpoint, tensors = ((folder / "kept" / name).read_bytes() for name in ("checkpoint.json", TENSORS))
         run = (folder / "run" / "mesh.checkpoint" / "run.json").read_bytes()
     report = json.loads(files["box.report.json"]) | {"textures": {"files": {"normal": "link.bin", "a": "../b.png"}}}
     return {
@@ -175,6 +189,11 @@ def unwrapped() -> dict[str, list[bytes]]:
         "trained": [files["box.trained.safetensors"]],
         "report": [json.dumps(report).encode()],
         "run": [run],
+        "manifest": [ledger + ledger.replace(b"box.obj", b"b.obj")],
+        "plan": [plan],
+        "list": [LIST],
+        "checkpoint": [checkpoint],
+        "tensors": [tensors],
         "mesh": [files["box.glb"]],
         "boxobj": [exported("obj")],
     }

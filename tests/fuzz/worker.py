@@ -117,8 +117,9 @@ def warm_up() -> None:
     from flexpara.runtime.io import anyfile, others
     from flexpara.runtime.sessions import session, wrapsession
     from flexpara.train import saved
+    from flexpara.train.paper import checkpoint
 
-    assert all((trimesh, gather, anyfile, others, session, wrapsession, saved))
+    assert all((trimesh, gather, anyfile, others, session, wrapsession, saved, checkpoint))
     for name in ("DracoPy", "meshoptimizer", "opengl_basisu", "lxml.etree", "collada", "networkx"):
         __import__(name)
 

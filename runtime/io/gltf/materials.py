@@ -135,10 +135,10 @@ def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.ui
     if source not in known:
         data = image_bytes(file, source)
         if not data.startswith(KTX2) and source != extensions.get(BASIS, {}).get("source"):
-            known[source] = decode_image(data)
+            known[source] = decode_image(data, known.values())
         else:
             try:
-                known[source] = decode_ktx2(data)
+                known[source] = decode_ktx2(data, known.values())
             except (MissingDependencyError, MeshError) as error:
                 return f"is a KTX 2 picture that can't be decoded ({error})"
     return known[source]

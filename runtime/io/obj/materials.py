@@ -57,7 +57,7 @@ def _pixels(
     """A picture beside the file, decoded once; None where it is absent.  known grows."""
     if name not in known:
         data = read_sibling(name)
-        known[name] = None if data is None else decode_image(data)
+        known[name] = None if data is None else decode_image(data, known.values())
     return known[name]
 
 

@@ -190,10 +190,13 @@ def _materials(
     if not header.textures:
         return (), None
     materials = []
+    known: dict[str, NDArray[np.uint8]] = {}
     for name in header.textures:
-        data = read_sibling(name)
-        changes["missing_textures"] = changes.get("missing_textures", 0) + (data is None)
-        picture = None if data is None else Picture(decode_image(data))
+        data = None if name in known else read_sibling(name)
+        if data is not None:
+            known[name] = decode_image(data, known.values())
+        picture = Picture(known[name]) if name in known else None
+        changes["missing_textures"] = changes.get("missing_textures", 0) + (picture is None)
         materials.append(
             Material(
                 name=name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,18 @@ def test_results_in_the_folder_that_is_searched_are_no_assets(tmp_path: Path) ->
     for name in ("a.obj", "out/a/a.obj"):
         mesh(tmp_path / name)
     assert [job.name for job in find_jobs([tmp_path], tmp_path / "out", Options(), Outputs())] == ["a.obj"]
+
+
+def test_names_that_are_no_text_are_spelled_out(tmp_path: Path) -> None:
+    for name in (b"\xff.obj", b"a\x1b[2J\n.obj", "ü.obj".encode()):
+        mesh(tmp_path / os.fsdecode(name))
+    assert sorted(job.name for job in jobs_of(tmp_path)) == ["\\udcff.obj", "a\\x1b[2J\\n.obj", "ü.obj"]
+
+
+def test_a_device_has_no_fingerprint(tmp_path: Path) -> None:
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text('{"file": "/dev/zero"}', encoding="utf-8")
+    assert jobs_of(listed)[0].content() == ""
 
 
 def test_shards_share_all_assets(tmp_path: Path) -> None:

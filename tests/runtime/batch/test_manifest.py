@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -43,6 +44,29 @@ def test_a_line_cut_short_by_a_kill_is_read_over_and_overwritten(kept: int, tmp_
 def test_lines_of_others_are_refused(line: bytes, tmp_path: Path) -> None:
     path = tmp_path / "manifest.jsonl"
     path.write_bytes(line + b"\n")
+    append(path, ENTRY)
+    with pytest.raises(InputError, match="line 1"):
+        read_entries(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seconds": None},
+        {"seconds": [1]},
+        {"memory": 10**400},
+        {"metrics": {"charts": "3"}},
+        {"files": {"a.glb": 1}},
+        {"folder": "../outside"},
+        {"folder": "/etc"},
+        {"asset": 3},
+        {"asset": "\ud800"},
+        {"again": "no"},
+    ],
+)
+def test_values_of_another_kind_are_refused(change: dict[str, object], tmp_path: Path) -> None:
+    path = tmp_path / "manifest.jsonl"
+    path.write_text(json.dumps({**asdict(ENTRY), **change}) + "\n", encoding="utf-8")
     append(path, ENTRY)
     with pytest.raises(InputError, match="line 1"):
         read_entries(path)

@@ -40,6 +40,15 @@ def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPat
         decode_image(whole)
 
 
+def test_pictures_of_a_file_are_limited_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = png(np.zeros((64, 64), np.uint8))
+    picture = decode_image(data)
+    monkeypatch.setenv("FLEXPARA_LIMITS", f"texels={64 * 64}")
+    assert decode_image(data, [picture, None, picture, picture]).shape == (64, 64, 4)
+    with pytest.raises(MeshError, match="together"):
+        decode_image(data, [picture] * 4)
+
+
 def test_names_reach_only_files_of_the_folder(tmp_path: Path) -> None:
     folder = tmp_path / "in"
     (folder / "sub").mkdir(parents=True)
