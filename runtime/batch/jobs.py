@@ -63,7 +63,7 @@ def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: O
         found |= _listed(path, options, outputs) if path.suffix in LISTS else _found(path, options, outputs)
     # results of an earlier run, where they lie in the folder that is searched
     found = {path: entry for path, entry in found.items() if output.absolute() not in path.parents}
-    found = {path: (printable(name), *rest) for path, (name, *rest) in found.items()}
+    found = {path: (printable(entry[0]), entry[1], entry[2]) for path, entry in found.items()}
     stems = Counter(str(Path(name).with_suffix("")) for name, _, _ in found.values())
     jobs = []
     for path, (name, own_options, own_outputs) in found.items():

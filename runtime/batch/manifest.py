@@ -104,8 +104,9 @@ def fits(value: object, kind: str) -> bool:
     if kind.startswith("list of "):
         return isinstance(value, list) and all(fits(each, kind[8:]) for each in value)
     if kind in ("number", "measure"):
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        return (value is None and kind == "measure") or (number and abs(value) < LARGEST_NUMBER)
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return abs(value) < LARGEST_NUMBER
+        return value is None and kind == "measure"
     if kind == "text":
         return isinstance(value, str) and value == value.encode("utf-8", "replace").decode()
     return isinstance(value, bool)

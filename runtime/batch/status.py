@@ -130,7 +130,10 @@ body{font:14px system-ui,sans-serif;margin:1.5em}
 table{border-collapse:collapse}
 td,th{padding:.3em .7em;text-align:left;border-bottom:1px solid #8884;vertical-align:middle}
 td[data-value]{text-align:right;font-variant-numeric:tabular-nums}
-th button{font:inherit;font-weight:bold;background:none;border:0;cursor:pointer;color:inherit}
+th button{font:inherit;font-weight:bold;background:none;border:0;padding:0;cursor:pointer;color:inherit}
+th:nth-child(n+4):nth-child(-n+9){text-align:right}
+th[aria-sort=ascending] button::after{content:" ▲"}
+th[aria-sort=descending] button::after{content:" ▼"}
 img{height:72px;display:block}
 </style></head><body>
 <h1>@COUNTED@</h1>

@@ -238,6 +238,79 @@ def test_a_killed_machine_costs_nothing_but_time(
     assert content(tmp_path) == undisturbed
 
 
+def test_a_clock_that_is_set_back_changes_nothing(meshes: Path, undisturbed: dict[str, object], tmp_path: Path) -> None:
+    """The clock of all processes falls by an hour with each look; files seem to come from the future."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import time\nlate, fallen = time.time(), []\n"
+        "time.time = lambda: (fallen.append(1), late - 3600 * len(fallen))[1]\n",
+        encoding="utf-8",
+    )
+    paths = {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    output = tmp_path / "out"
+    code, said = ended(begun(meshes, output, environment=paths))
+    assert code == 0, said
+    for path in output.rglob("*"):
+        os.utime(path, (1, 1))
+    code, said = ended(begun(meshes, output, environment=paths))
+    assert code == 0
+    assert "0 of 3 assets are left" in said
+    assert content(output) == undisturbed
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 64 kB, which one result fills."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)], capture_output=True)
+    if made.returncode:
+        pytest.skip("no disk can be mounted here")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a disk is mounted")
+def test_a_full_disk_leaves_nothing_half_written_and_more_room_completes_it(
+    meshes: Path, undisturbed: dict[str, object], small_disk: Path
+) -> None:
+    code, said = ended(begun(meshes, small_disk))
+    assert code == 2, said
+    assert "is full" in said
+    left = content(small_disk)
+    assert left.items() <= undisturbed.items()
+    assert len(left) < len(undisturbed)
+    subprocess.run(["mount", "-o", "remount,size=64m", str(small_disk)], check=True)
+    code, said = ended(begun(meshes, small_disk))
+    assert code == 0, said
+    assert content(small_disk) == undisturbed
+
+
+def test_two_batches_on_one_folder_are_one(meshes: Path, undisturbed: dict[str, object], tmp_path: Path) -> None:
+    first = begun(meshes, tmp_path)
+    while not workers_of(first.pid):
+        assert first.poll() is None
+        time.sleep(0.02)
+    code, said = ended(begun(meshes, tmp_path))
+    assert code == 2
+    assert f"process {first.pid} works on" in said
+    assert ended(first)[0] == 0
+    assert content(tmp_path) == undisturbed
+
+
+def test_a_second_ctrl_c_ends_at_once(meshes: Path, undisturbed: dict[str, object], tmp_path: Path) -> None:
+    run = begun(meshes, tmp_path)
+    while not workers_of(run.pid):
+        assert run.poll() is None
+        time.sleep(0.02)
+    run.send_signal(signal.SIGINT)
+    time.sleep(0.2)
+    run.send_signal(signal.SIGINT)
+    asked = time.monotonic()
+    assert ended(run)[0] == 130
+    assert time.monotonic() - asked < 5.0  # a moment on an idle machine
+    assert content(tmp_path).items() <= undisturbed.items()
+
+
 def test_ctrl_c_gives_back_what_runs_and_the_next_run_completes_it(
     meshes: Path, undisturbed: dict[str, object], tmp_path: Path
 ) -> None:
