@@ -24,10 +24,15 @@ def drawn(title: str, rows: list[dict[str, Any]], key: str) -> str:
         parts.append(stroke(LEFT, y.at(value), WIDTH - RIGHT, y.at(value)))
         parts.append(text(LEFT - 8.0, y.at(value) + 4.0, f"{value:g}", "end"))
     parts.append(text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14.0, "faces", "middle"))
+    shown = 0
     for tool in dict.fromkeys(row["tool"] for row in rows):
         for family, dash in DASHES.items():
             line = sorted((row["faces"], row[key]) for row in rows if belongs(row, tool, family))
-            parts += curve([(x.at(faces), y.at(value)) for faces, value in line], f"{tool}, {family}", tool, dash)
+            if line:
+                style = f'stroke="{COLORS.get(tool, OURS)}" stroke-width="1.6" stroke-dasharray="{dash or "none"}"'
+                parts += curve([(x.at(faces), y.at(value)) for faces, value in line], style)
+                parts += named(f"{tool}, {family}", TOP + 20.0 * shown, style)
+                shown += 1
     size = f'width="{WIDTH:g}" height="{HEIGHT:g}" viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
     style = 'font-family="sans-serif" style="background:#fff"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {style}>\n' + "\n".join(parts) + "\n</svg>\n"
@@ -38,16 +43,15 @@ def belongs(row: dict[str, Any], tool: str, family: str) -> bool:
     return row["tool"] == tool and (row["family"] == family or (family == "bunny" and row["name"] == "bunny"))
 
 
-def curve(points: list[tuple[float, float]], words: str, tool: str, dash: str) -> list[str]:
-    """A line through points in pixels, dots on it, and its name at its end."""
-    if not points:
-        return []
-    color = COLORS.get(tool, OURS)
+def curve(points: list[tuple[float, float]], style: str) -> list[str]:
+    """A line through points in pixels, and dots on it."""
     through = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    style = f'fill="none" stroke="{color}" stroke-width="1.6" stroke-dasharray="{dash or "none"}"'
-    dots = [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{color}"/>' for x, y in points]
-    return [
-        f'<polyline points="{through}" {style}/>',
-        *dots,
-        text(points[-1][0] + 7.0, points[-1][1] + 4.0, words, "start", color=color),
-    ]
+    dots = [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" {style}/>' for x, y in points]
+    return [f'<polyline points="{through}" fill="none" {style}/>', *dots]
+
+
+def named(words: str, height: float, style: str) -> list[str]:
+    """A line of the legend."""
+    left = WIDTH - RIGHT + 14.0
+    sample = f'<line x1="{left:.1f}" y1="{height:.1f}" x2="{left + 30.0:.1f}" y2="{height:.1f}" {style}/>'
+    return [sample, text(left + 36.0, height + 4.0, words, "start")]
