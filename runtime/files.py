@@ -173,7 +173,7 @@ class OutputFolder:
             replace_file(journal, json.dumps({"producer": PRODUCER, "files": names}).encode())
         for name in names:
             (staging / name).replace(self.folder / name)
-        journal.unlink()
+        journal.unlink(missing_ok=True)  # another attempt at the same, on a machine thought lost, may have been here
         self._made = ()
         self._discard()
         return tuple(self.folder / name for name in names)
