@@ -93,7 +93,7 @@ def unwrap(
     from .runtime.progress import Clock
 
     options = from_keywords(Options, options, keywords)
-    demand(options.atlas == "scene", f"atlas is {options.atlas} in unwrap, expected scene; call unwrap_pages")
+    demand(not options.several, "several atlases in unwrap, expected one; call unwrap_pages")
     clock = Clock(progress, Deadline(options.time_budget))
     source = load_any(mesh, options.select)
     if isinstance(source, PointCloud):
@@ -104,7 +104,7 @@ def unwrap(
 def unwrap_pages(
     mesh: MeshLike, options: Options | None = None, *, progress: Progress | None = None, **keywords: Any
 ) -> UnwrapPages:
-    """Unwrap a mesh onto several atlases: options.atlas says whether each mesh of a scene or each material has one.
+    """Unwrap a mesh onto several atlases: one for each mesh or material (options.atlas), or options.pages of them.
 
     Args and raises: as `unwrap`; MissingDependencyError where flexpara[bake] is absent.
     """
@@ -130,20 +130,22 @@ def unwrap_asset(
         from .train.presets import train_asset
 
     clock, asset = Clock.of(progress), shaded(asset, options.crease_angle)
-    trained = train_asset(asset, options, clock, keep)
-    return UnwrapResult(asset, assemble(asset, trained, clock, square_of(options)))
+    return UnwrapResult(asset, assemble(asset, train_asset(asset, options, clock, keep), clock, square_of(options)))
 
 
 def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapPages:
     """The asset's pages, shaded as one mesh, each as `unwrap_asset`.  Raises: as that."""
     from .runtime.extras import requires
-    from .runtime.io.pages import pages_of
     from .runtime.io.shading import shaded
+    from .runtime.progress import Clock
 
     with requires("bake"):
         from .bake.files.gltfmade import with_document
+    with requires("unwrap"):
+        from .export.pages import unwrapped_pages
     whole = with_document(shaded(asset, options.crease_angle))
-    return UnwrapPages(whole, tuple(unwrap_asset(page, options, progress) for page in pages_of(whole, options.atlas)))
+    pages = unwrapped_pages(whole, options, Clock.of(progress))
+    return UnwrapPages(whole, tuple(UnwrapResult(*page) for page in pages))
 
 
 def unwrap_cloud(
@@ -163,8 +165,7 @@ def unwrap_cloud(
 
     clock = Clock.of(progress)
     mesh, trained = train_cloud(cloud, options, clock, keep)
-    found = assemble(mesh.asset, trained, clock, square_of(options))
-    return UnwrapResult(mesh.asset, found, cloud, mesh)
+    return UnwrapResult(mesh.asset, assemble(mesh.asset, trained, clock, square_of(options)), cloud, mesh)
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,9 +316,8 @@ class UnwrapPages(Saving):
 
         check_pages(output, outputs, [page.asset for page in self.pages])
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
-        jobs = page_jobs(
-            outputs, [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
-        )
+        pairs = [(page.asset, page.found.atlas) for page in self.pages]
+        jobs = page_jobs(outputs, pairs, self.reports[0]["settings"]["seed"])
         for page in self.pages:
             networks = write_networks(output, page.asset, page.found, clock, inverse=outputs.inverse)
             report["pages"][page.asset.stem] = {**page.report, **networks}

@@ -188,6 +188,8 @@ def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
     """Refuse before the work what writing would refuse after it.  Raises: as `check_outputs`, `check_pages`."""
     outputs = run.outputs.for_asset(source)
     check_outputs(folder, outputs, chosen_maps(outputs))
+    if run.options.pages > 1:
+        run.outputs.for_pages()
     if run.options.atlas != SHARINGS[0]:
         from .runtime.io.pages import pages_of
 
@@ -219,7 +221,7 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
             with ending:
                 if not isinstance(source, Asset):
                     result = unwrap_cloud(source, run.options, clock, run.keep)
-                elif run.options.atlas == SHARINGS[0]:
+                elif not run.options.several:
                     result = unwrap_asset(source, run.options, clock, run.keep)
                 else:
                     result = unwrap_asset_pages(source, run.options, clock)

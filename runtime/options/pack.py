@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .unwrap import FORMATS, AtlasOptions, MapOptions, Outputs, Seeded
+from .unwrap import FORMATS, MOST_PAGES, AtlasOptions, MapOptions, Outputs, Seeded
 from .words import Flag, Names, demand
 
 if TYPE_CHECKING:
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 OWN = "own"
 """Format of a file as it was given."""
 DENSITIES = ("equal", "kept")
-MOST_PAGES = 1000
-"""UDIM has no more tiles."""
 
 
 @dataclass(frozen=True, kw_only=True)

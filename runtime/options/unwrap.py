@@ -40,6 +40,8 @@ PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_0
 """Least and most of preset paper's numbers."""
 FAST_ALONE = ("seam_price", "max_stretch", "hard_edges", "keep_seams", "keep_islands", "cut")
 """Options that preset paper has no use for."""
+MOST_PAGES = 1000
+"""UDIM has no more tiles."""
 LAST_SET = 7
 """Of uv sets that programs read."""
 
@@ -184,10 +186,22 @@ class Options(AtlasOptions, TrainOptions):
     atlas: Literal["scene", "mesh", "material"] = "scene"
     """What shares an atlas: all of a scene, or each mesh or material has one with textures and an ONNX file of its
     own."""
+    pages: int = 1
+    """Pages that the charts are shared out to, 1 to 1000, at one texel density: where one would be too coarse.  Each
+    has a material, textures and an ONNX file of its own, in one glb or gltf file."""
+
+    @property
+    def several(self) -> bool:
+        """Whether there may be more than one atlas."""
+        return self.atlas != SHARINGS[0] or self.pages > 1
 
     def __post_init__(self) -> None:
         TrainOptions.__post_init__(self)
         AtlasOptions.__post_init__(self)
+        found = f"pages is {self.pages}, expected 1 to {MOST_PAGES}"
+        demand(1 <= self.pages <= MOST_PAGES, f"{found}; pass for instance --pages 4")
+        plain = self.pages == 1 or (self.preset == "fast" and self.atlas == SHARINGS[0] and self.stack == "off")
+        demand(plain, f"{self.pages} pages with atlas, stack or preset paper, expected one of them; leave one out")
         demand_known("atlas", self.atlas, SHARINGS)
         single = self.atlas == SHARINGS[0] or self.preset == "fast"
         demand(single, f"atlas is {self.atlas} with preset paper, expected scene; leave --atlas out")
@@ -294,9 +308,7 @@ class Outputs(FileOptions, MapOptions):
     def for_pages(self) -> None:
         """Raises: InputError for what a mesh with several atlases can't be written as."""
         found, fits = ", ".join(self.formats), set(self.formats) <= set(SCENES)
-        demand(
-            fits, f"several atlases with format {found}, expected glb or gltf, which hold several; pass --format glb"
-        )
+        demand(fits, f"several atlases with format {found}, expected glb or gltf; pass --format glb")
         demand(not self.layers, "several atlases with layers, expected one of the two; leave the other out")
         demand(not self.report, "several atlases with report, expected one of the two; leave the other out")
 

@@ -1,0 +1,62 @@
+"""An unwrapped mesh on several pages of one texel density, each with the networks of its own charts.
+
+f faces.  Charts are found once, over the whole mesh; pages share them out, and each is packed, fitted and exported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..runtime.io.pages import pages_of, part_of
+from ..runtime.mesh import Surface
+from ..runtime.pack.asked import some_charts
+from ..runtime.pack.pages import pack_pages
+from ..runtime.pack.square import square_of
+from ..train.deploy.fit import fit_networks
+from ..train.fromjson import fit_in_force
+from ..train.presets import train_asset
+from .assemble import Unwrapped, assemble
+
+if TYPE_CHECKING:
+    from ..runtime.mesh import Asset
+    from ..runtime.options.unwrap import Options
+    from ..runtime.pack.square import Square
+    from ..runtime.progress import Clock
+    from ..train.pipeline import Trained
+
+
+def unwrapped_pages(asset: Asset, options: Options, clock: Clock) -> list[tuple[Asset, Unwrapped]]:
+    """The pages that options ask for: meshes, materials or so many, each with what came of it.
+
+    asset: with a document, shaded.  Raises: as `train_asset` and `assemble`.
+    """
+    square = square_of(options)
+    if options.pages > 1:
+        return assemble_pages(asset, train_asset(asset, options, clock), clock, square, options.pages)
+    parts = pages_of(asset, options.atlas)
+    return [(part, assemble(part, train_asset(part, options, clock), clock, square)) for part in parts]
+
+
+def assemble_pages(
+    asset: Asset, trained: Trained, clock: Clock, square: Square, count: int
+) -> list[tuple[Asset, Unwrapped]]:
+    """Each page that got charts: a mesh of its own, STEM_1, STEM_2, …, and what `assemble` makes of it.
+
+    asset: with a document.  Raises: as `assemble`.
+    """
+    seed, fit = trained.settings["seed"], fit_in_force(trained.settings)
+    with clock.stage("pack"):
+        paged = pack_pages(asset, trained.charts, square, count, seed)
+    even = square._replace(texel_density=paged.report["chart_scale"] * square.size)
+    found: list[tuple[Asset, Unwrapped]] = []
+    for number in np.unique(paged.page).tolist():
+        own = paged.page == number
+        page = part_of(asset, own, f"{asset.stem}_{number + 1}")
+        charts = some_charts(trained.charts, np.flatnonzero(own))
+        ball = Surface(trained.frame.apply(page.surface.vertices), page.surface.faces)
+        networks = fit_networks(ball, charts, fit, seed, clock)
+        found.append((page, assemble(page, replace(trained, charts=charts, networks=networks), clock, even)))
+    return found
