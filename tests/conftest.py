@@ -95,6 +95,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     pytest.importorskip("torch")
     import numpy as np
 
+    from flexpara.runtime.io.wantedseams import NO_WISH, WantedSeams
     from flexpara.runtime.mesh import Charts, Frame, Surface
     from flexpara.runtime.progress import Clock
     from flexpara.train import presets
@@ -109,9 +110,9 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
         settings: TrainConfig,
         progress: Progress | None = None,
         deadline: Deadline | None = None,
-        wanted: np.ndarray | None = None,
+        wanted: WantedSeams = NO_WISH,
     ) -> Trained:
-        assert wanted is None or wanted.dtype == bool, (wanted, deadline)
+        assert wanted == NO_WISH, (wanted, deadline)
         trained.append(surface)
         if progress is not None:
             progress("train", 1, 1, 0.5)

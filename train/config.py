@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
+from ..runtime.geometry.places import PlaceConfig
 from .carry.config import ArcConfig, CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import FlapConfig, ProjectConfig, SlitConfig
@@ -254,5 +255,7 @@ class TrainConfig:
     seed: int = 0
     """Seed of all generators."""
     finish: FinishConfig = field(default_factory=FinishConfig)
+    places: PlaceConfig = field(default_factory=PlaceConfig)
+    """Prices of seams by place, where hidden ones are asked for or points protected."""
     fit: FitConfig = field(default_factory=FitConfig)
     wrap: WrapConfig = field(default_factory=WrapConfig)

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..runtime.geometry.places import priced_places
 from ..runtime.geometry.topology import edge_table, split_non_manifold_vertices
+from ..runtime.io.wantedseams import NO_WISH
 from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
-from .charts.charts import Finished, chart_surface
+from .charts.charts import Finished, chart_surface, priced
 from .deploy.fit import fit_networks
 
 if TYPE_CHECKING:
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
     from torch import nn
 
     from ..runtime.deadline import Deadline
+    from ..runtime.geometry.places import PlaceConfig
+    from ..runtime.io.wantedseams import WantedSeams
     from ..runtime.progress import Progress
-    from .config import TrainConfig
+    from .config import FinishConfig, TrainConfig
     from .deploy.gated import GatedExperts
 
 
@@ -49,7 +53,7 @@ def train(
     config: TrainConfig,
     progress: Progress,
     deadline: Deadline | None = None,
-    wanted: NDArray[np.bool_] | None = None,
+    wanted: WantedSeams = NO_WISH,
 ) -> Trained:
     """Charts and networks of a welded surface.
 
@@ -58,15 +62,18 @@ def train(
         config: numbers.
         progress: told the stages.
         deadline: when the search ends with the best it has; None: it ends by itself, the same every time.
-        wanted: (e,) edges of the surface's edge table that become seams: it is cut open there before it is charted.
+        wanted: edges that become seams, the surface is cut open there before it is charted; and points, in source
+            units, that seams keep away from.
 
     Raises:
         FinishError: no valid charts could be made (a defect).
     """
     frame = Frame.of(surface.vertices)
     ball = replace(surface, vertices=frame.apply(surface.vertices))
-    opened = ball if wanted is None else cut_along(ball, wanted)
-    finished = chart_surface(opened, config.charts, config.finish, config.seed, Stages(progress, deadline))
+    opened = ball if wanted.cut is None else cut_along(ball, wanted.cut)
+    protected = None if wanted.protected is None else frame.apply(wanted.protected)
+    finish = at_places(config.finish, ball, config.places, protected)
+    finished = chart_surface(opened, config.charts, finish, config.seed, Stages(progress, deadline))
     return with_networks(surface, finished, config, progress)
 
 
@@ -87,6 +94,15 @@ def with_networks(surface: Surface, finished: Finished, config: TrainConfig, pro
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
+
+
+def at_places(
+    finish: FinishConfig, surface: Surface, config: PlaceConfig, protected: NDArray[np.float64] | None
+) -> FinishConfig:
+    """The same with prices of seams by place, where hidden ones are asked for or points (n, 3) are protected."""
+    if not config.hidden and protected is None:
+        return finish
+    return priced(finish, replace(finish.slit.seams, places=priced_places(surface, config, protected)))
 
 
 def cut_along(surface: Surface, wanted: NDArray[np.bool_]) -> Surface:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ..runtime.extras import requires
 from ..runtime.io.wantedseams import wanted_seams
 from ..runtime.mesh import Frame
+from .charts.charts import priced
 from .charts.kept import kept_islands
 from .cloud.config import CloudConfig
 from .cloud.reconstruct import reconstruct
@@ -85,8 +86,10 @@ def fast_config(options: TrainOptions) -> TrainConfig:
     """The settings of preset fast that these options ask for."""
     plain = TrainConfig(charts=options.most_charts, seed=options.seed)
     stretch = 0.0 if options.max_stretch is None else options.max_stretch - 1.0
-    slit = replace(plain.finish.slit, price=options.seam_price)
-    return replace(plain, finish=replace(plain.finish, slit=slit, stretch=stretch))
+    finish = replace(plain.finish, slit=replace(plain.finish.slit, price=options.seam_price), stretch=stretch)
+    if options.seams == "crease":
+        finish = priced(finish, replace(finish.slit.seams, counted=True))
+    return replace(plain, finish=finish, places=replace(plain.places, hidden=options.seams == "hidden"))
 
 
 def paper_config(options: TrainOptions) -> PaperConfig:

@@ -5,7 +5,7 @@ v vertices · e edges of an edge table · f faces.  Paths are lists of vertices;
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..mesh import Surface
+    from .places import Places
     from .topology import EdgeTable
 
 
@@ -32,6 +33,15 @@ class SeamPrices:
     """1 − cos of the dihedral deviation below which an edge lies inside a flat face: about 1e-4 radians."""
     flat_price: float = 8.0
     """What it costs through a flat face: a crease nearby is cheaper."""
+    places: Places | None = None
+    """What it costs by place, in the frame of the surface; None: everywhere alike."""
+    counted: bool = False
+    """Whether creases make a border cheaper in the objective too, so that charts are merged and split for them; places
+    always do."""
+
+    def moved(self, origin: NDArray[np.float64], scale: float) -> SeamPrices:
+        """The same for a surface whose points are (xyz − origin) / scale."""
+        return self if self.places is None else replace(self, places=self.places.moved(origin, scale))
 
 
 class ShortestPaths(NamedTuple):
@@ -55,7 +65,21 @@ def seam_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArr
     """(e,) price per length of a cut along each edge: 1, down to 1 − crease_discount in creases, more in flat faces."""
     sharpness = crease_sharpness(surface, table)
     flat = table.manifold & (sharpness * 0.5 < prices.flat)
-    return np.where(flat, prices.flat_price, 1.0 - prices.crease_discount * sharpness)
+    price = np.where(flat, prices.flat_price, 1.0 - prices.crease_discount * sharpness)
+    return price * place_prices(surface, table, prices)
+
+
+def place_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:
+    """(e,) price per length of a cut along each edge for where it lies."""
+    if prices.places is None:
+        return np.ones(len(table.edges))
+    return prices.places.at(surface.vertices[table.edges].mean(axis=1))
+
+
+def counted_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:
+    """(e,) what a border counts in the objective, per length of each edge: 1, but for places and counted creases."""
+    price = place_prices(surface, table, prices)
+    return price * (1.0 - prices.crease_discount * crease_sharpness(surface, table)) if prices.counted else price
 
 
 def edge_costs(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:

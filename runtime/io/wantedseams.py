@@ -6,7 +6,7 @@ f faces · e edges of the edge table of asset.surface, in whose order masks are.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -27,12 +27,25 @@ UV_ALIKE = 1e-6
 """Distance of uv up to which two corners lie at one place."""
 
 
-def wanted_seams(asset: Asset, options: SeamOptions, crease_angle: float) -> NDArray[np.bool_] | None:
-    """(e,) bool: edges of the surface that options ask to be seams; None where they ask for none.
+class WantedSeams(NamedTuple):
+    """cut: (e,) bool, edges that are to be seams.  protected: (n, 3) points, source units, that seams keep away from.
+
+    Each is None where nothing is asked for.
+    """
+
+    cut: NDArray[np.bool_] | None = None
+    protected: NDArray[np.float64] | None = None
+
+
+NO_WISH = WantedSeams()
+
+
+def wanted_seams(asset: Asset, options: SeamOptions, crease_angle: float) -> WantedSeams:
+    """What options ask of the seams of a mesh.
 
     Args:
         asset: the mesh as it was read, or shaded.
-        options: which borders stay, and a file of cuts.
+        options: which borders stay, a file of cuts, and one of points to keep away from.
         crease_angle: degrees above which an edge is hard, where the file has neither normals nor smoothing groups.
 
     Raises: InputError for uv that the mesh does not have, or a file of cuts that is none; MissingFileError.
@@ -43,7 +56,8 @@ def wanted_seams(asset: Asset, options: SeamOptions, crease_angle: float) -> NDA
         found |= torn(table, values_of(asset, name, crease_angle), UV_ALIKE if name == "uv" else ALIKE)
     if options.cut is not None:
         found |= cuts_of(asset, table, Path(options.cut))
-    return found if options.kept or options.cut is not None else None
+    protected = None if options.protect is None else read_protected(Path(options.protect))
+    return WantedSeams(found if options.kept or options.cut is not None else None, protected)
 
 
 def values_of(asset: Asset, name: str, crease_angle: float) -> NDArray[np.float64]:
@@ -83,6 +97,19 @@ def cuts_of(asset: Asset, table: EdgeTable, path: Path) -> NDArray[np.bool_]:
             raise InputError(f"{path} has a cut that joins no two vertices of one part; correct its points")
         ways.append(trace_back(tree.parent, end))
     return path_mask(table, ways)
+
+
+def read_protected(path: Path) -> NDArray[np.float64]:
+    """(n, 3) the points of a .npy file.  Raises: InputError, MissingFileError."""
+    if not path.is_file():
+        raise MissingFileError(f"{path} is no file, expected a .npy file of points (n, 3); correct it")
+    try:
+        points = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError, OSError) as error:
+        raise InputError(f"{path} can't be read ({error}), expected a .npy file of points (n, 3)") from error
+    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf" or not np.isfinite(points).all():
+        raise InputError(f"{path} holds {points.dtype} {points.shape}, expected finite points (n, 3); save those")
+    return points.astype(np.float64)
 
 
 def read_cuts(path: Path) -> NDArray[np.float64]:

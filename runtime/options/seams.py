@@ -15,6 +15,7 @@ MANY = 10_000
 KEPT = ("uv", "hard", "material")
 """Borders of a mesh that can stay."""
 HARD = ("free", "split")
+SEAMS = ("short", "hidden", "crease")
 DEAREST, LEAST_STRETCH, MOST_STRETCH = 10.0, 1.0001, 2.0
 
 
@@ -30,6 +31,11 @@ class SeamOptions:
     max_stretch: float | None = None
     """Mean stretch (symmetric Dirichlet, 1 is none) that each connected part may have, for the shortest seams that
     keep it, for instance 1.025; by default the seam price decides alone."""
+    seams: Literal["short", "hidden", "crease"] = "short"
+    """Where seams go: short ones anywhere, hidden ones where the surface sees less of the sky (needs flexpara[bake]),
+    or along creases, though they are longer for it."""
+    protect: Path | None = None
+    """A .npy file of points (n, 3), in the units of the mesh, near which seams cost ten times as much."""
     hard_edges: Literal["free", "split"] = "free"
     """Whether every hard edge (split normals, smoothing groups, or the crease angle) becomes a seam: split, as normal
     maps for games want it, or free."""
@@ -52,6 +58,7 @@ class SeamOptions:
         found = f"max-stretch is {self.max_stretch}, expected {LEAST_STRETCH:g} to {MOST_STRETCH:g}"
         demand(bounded, f"{found}; pass for instance --max-stretch 1.025")
         demand_known("hard-edges", self.hard_edges, HARD)
+        demand_known("seams", self.seams, SEAMS)
         for name in self.keep_seams:
             demand(name in KEPT, f"keep-seams is {name!r}, expected some of {', '.join(KEPT)}; leave --keep-seams out")
 

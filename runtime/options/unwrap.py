@@ -38,7 +38,7 @@ POLYGONS = ("obj", "ply", "usda")
 LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
-FAST_ALONE = ("seam_price", "max_stretch", "hard_edges", "keep_seams", "keep_islands", "cut")
+FAST_ALONE = ("seam_price", "max_stretch", "hard_edges", "keep_seams", "keep_islands", "cut", "seams", "protect")
 """Options that preset paper has no use for."""
 MOST_PAGES = 1000
 """UDIM has no more tiles."""

@@ -21,7 +21,7 @@ from flexpara.train.presets import train_asset
 
 def test_every_hard_edge_of_a_cube_is_a_seam_where_that_is_asked_and_is_not_otherwise() -> None:
     cube = asset_from_arrays(*make_sample("cube", resolution=12))
-    hard = wanted_seams(cube, SeamOptions(hard_edges="split"), 30.0)
+    hard = wanted_seams(cube, SeamOptions(hard_edges="split"), 30.0).cut
     assert hard is not None
     table = edge_table(cube.surface.faces)
     for options in (TrainOptions(hard_edges="split"), TrainOptions()):

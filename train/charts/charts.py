@@ -37,6 +37,7 @@ from .tighten import back_on, is_asked, spent_fine, tightened
 
 if TYPE_CHECKING:
     from ...runtime.deadline import Late
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.progress import Stages
     from ..config import FinishConfig
     from ..search.search import Search
@@ -90,13 +91,12 @@ def chart_surface(
 
     def solve(number: int) -> Solved:
         part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
-        starts = Starts(part, config.closing.charts, part.scale**2 / total, config, seed, scores, late)
-        solved = solve_part(part.surface, charts, starts, config)
+        own = priced(config, config.slit.seams.moved(part.origin, part.scale))
+        starts = Starts(part, config.closing.charts, part.scale**2 / total, own, seed, scores, late)
+        solved = solve_part(part.surface, charts, starts, own)
         polygon = None if surface.polygon is None else surface.polygon[part.ids]
         page = Page(float(np.sqrt(total)) / part.scale, charts, polygon)
-        return (
-            solved if config.stretch else solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
-        )
+        return solved if config.stretch else solved._replace(pieces=shortened(part.surface, solved.pieces, page, own))
 
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
@@ -116,6 +116,11 @@ def chart_surface(
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
     told = (*hurried(stage.deadline, late), *notes(solved, charts, config))
     return Finished(pieces, objective(surface, pieces, config.slit.price), facts, told)
+
+
+def priced(config: FinishConfig, seams: SeamPrices) -> FinishConfig:
+    """The same with other prices of seams."""
+    return replace(config, labels=replace(config.labels, seams=seams), slit=replace(config.slit, seams=seams))
 
 
 def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:

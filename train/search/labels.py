@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, maximum_flow
 
-from ...runtime.geometry.cutgraph import seam_prices
+from ...runtime.geometry.cutgraph import counted_prices, seam_prices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 
 class DualGraph(NamedTuple):
-    """Faces joined across manifold edges.  pairs (m, 2) int64; length (m,) of the edges; cost (m,) of a seam there."""
+    """Faces joined across manifold edges.
+
+    pairs: (m, 2) int64.  length: (m,) of the edges as a border of charts counts it, which places and creases may
+    change.  cost: (m,) of a seam there, by which ways are chosen.
+    """
 
     pairs: NDArray[np.int64]
     length: NDArray[np.float64]
@@ -40,7 +44,8 @@ def dual_graph(surface: Surface, table: EdgeTable, prices: SeamPrices) -> DualGr
     pairs = table.edge_faces[inside]
     ends = surface.vertices[table.edges[inside]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return DualGraph(pairs, length, length * seam_prices(surface, table, prices)[inside])
+    cost = length * seam_prices(surface, table, prices)[inside]
+    return DualGraph(pairs, length * counted_prices(surface, table, prices)[inside], cost)
 
 
 def label_energy(label: NDArray[np.int64], unary: NDArray[np.float64], graph: DualGraph) -> float:
