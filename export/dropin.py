@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import logging
 import math
+import time
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..runtime.deadline import Deadline
 from ..runtime.errors import FinishError, InputError, MeshError
 from ..runtime.geometry.metrics import uv_charts
 from ..runtime.geometry.rows import by_first_appearance, equal_rows, first_of_each
@@ -31,9 +33,9 @@ from ..train.finish.projected import projected
 from ..train.pipeline import as_charts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Callable, Sequence
 
-    from ..runtime.deadline import Deadline
+    from numpy.typing import NDArray
 
 LOG = logging.getLogger("flexpara.xatlas")
 NOWHERE = 2**32 - 1
@@ -95,6 +97,25 @@ class Placed(NamedTuple):
         chart = np.full(len(self.mapping), -1, dtype=np.int64)
         np.maximum.at(chart, self.faces.reshape(-1), np.repeat(self.face_chart, 3))
         return np.where(chart < 0, NOWHERE, chart).astype(np.uint32)
+
+
+class Waiting(NamedTuple):
+    """A mesh that was handed over: the number of its faces, and how it becomes a part by a deadline."""
+
+    faces: int
+    part: Callable[[Deadline], Part]
+
+
+def parts_in_time(waiting: Sequence[Waiting], budget: float | None) -> list[Part]:
+    """Each mesh charted within its share, by faces, of what is left of a budget in seconds; None is no limit."""
+    start, left, parts = time.monotonic(), sum(mesh.faces for mesh in waiting), list[Part]()
+    for mesh in waiting:
+        seconds = None
+        if budget is not None:
+            seconds = max(budget - (time.monotonic() - start), 0.0) * mesh.faces / max(left, 1)
+        parts.append(mesh.part(Deadline(seconds)))
+        left -= mesh.faces
+    return parts
 
 
 def surface_part(

@@ -8,17 +8,15 @@ Options that mean nothing here are taken, and said once in the log of "flexpara.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..runtime.deadline import Deadline
 from ..runtime.errors import FlexparaError, ShapeError
-from .dropin import LOG, NOWHERE, Page, Part, Placed, Wanted, packed_page, surface_part, uv_part
+from .dropin import LOG, NOWHERE, Page, Placed, Waiting, Wanted, packed_page, parts_in_time, surface_part, uv_part
 from .plainarrays import RefusedError, drawn, export, faces_of, rows
 
 if TYPE_CHECKING:
@@ -39,7 +37,7 @@ class Settings:
     """What xatlas has no words for.  Set its fields: the next `generate` reads them."""
 
     time_budget: float | None = 60.0
-    """Seconds after which the search ends with the best charts so far; packing comes after.  None: no limit."""
+    """Seconds that `generate` should take, packing included: the search ends in time for it.  None: no limit."""
     charts: int = 8
     """The most charts that each connected part may get, unless more are needed to keep its stretch low."""
     seed: int = 0
@@ -131,7 +129,7 @@ class Atlas:
     """Meshes on one page.  Until `generate` it holds none, as with xatlas."""
 
     def __init__(self) -> None:
-        self._waiting: list[Callable[[Deadline], Part]] = []
+        self._waiting: list[Waiting] = []
         self._materials: list[NDArray[np.int64] | None] = []
         self._page: Page | None = None
         self._image: NDArray[np.uint8] | None = None
@@ -149,7 +147,9 @@ class Atlas:
                 rows(name, given, columns, len(points))
                 say_once(f"{name}s given to add_mesh mean nothing to flexpara and are not used")
         faces = faces_of(indices, len(points))
-        self._add(lambda late: surface_part(points, faces, settings.charts, settings.seed, late), None)
+        charted = partial(surface_part, points, faces)
+        mesh = Waiting(len(faces), lambda deadline: charted(settings.charts, settings.seed, deadline))
+        self._add(mesh, None)
 
     def add_uv_mesh(self, uvs: ArrayLike, indices: ArrayLike, face_materials: ArrayLike | None = None) -> None:
         """Add a layout uv (n, 2) to be packed anew; charts never join two materials (f,).  Mirrored charts are turned.
@@ -162,12 +162,12 @@ class Atlas:
         materials = np.asarray(given).astype(np.int64).reshape(-1)
         if len(materials) != len(faces):
             raise ShapeError(f"Material array has {len(materials)} elements, expected {len(faces)}, one for each face")
-        self._add(lambda _: uv_part(uv, faces, materials), materials)
+        self._add(Waiting(0, lambda _: uv_part(uv, faces, materials)), materials)
 
-    def _add(self, part: Callable[[Deadline], Part], materials: NDArray[np.int64] | None) -> None:
+    def _add(self, mesh: Waiting, materials: NDArray[np.int64] | None) -> None:
         if self._materials and (self._materials[0] is None) != (materials is None):
             raise RefusedError("Adding mesh failed: meshes and uv meshes can't be added to the same atlas")
-        self._waiting.append(part)
+        self._waiting.append(mesh)
         self._materials.append(materials)
 
     def generate(
@@ -176,12 +176,11 @@ class Atlas:
         pack_options: PackOptions | None = None,
         verbose: bool = False,
     ) -> None:
-        """Chart all meshes within `settings.time_budget`, and pack them.  verbose: say so in the log."""
+        """Chart all meshes and pack them, within `settings.time_budget`.  verbose: say so in the log."""
         chosen = pack_options or PackOptions()
         for options in (chart_options or ChartOptions(), chosen):
             _say_unused(options)
-        deadline = Deadline(settings.time_budget)
-        parts = [part(deadline) for part in self._waiting]
+        parts = parts_in_time(self._waiting, settings.time_budget)
         padding = max(int(chosen.padding), 1 if chosen.bilinear else 0)
         wanted = Wanted(int(chosen.resolution), float(chosen.texels_per_unit), padding)
         self._page = packed_page(parts, wanted, settings.seed) if parts else None

@@ -19,6 +19,7 @@ import xatlas as real
 
 import flexpara.xatlas as xatlas  # pyright: ignore[reportMissingImports]  # runtime/aliases.py finds it
 from flexpara.export import dropin
+from flexpara.runtime.deadline import Deadline
 from flexpara.runtime.errors import FinishError, FlexparaError, ShapeError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.io.meshfile import asset_from_arrays
@@ -278,6 +279,19 @@ def test_the_time_budget_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> Non
     for xatlas.settings.time_budget in (1e-9, None):
         unwrapped(xatlas.parametrize(ball.vertices, ball.faces), ball.vertices, ball.faces)
     assert late == [True, False]
+
+
+def test_meshes_share_the_time_budget_by_their_faces() -> None:
+    given: list[float | None] = []
+
+    def part(deadline: Deadline) -> dropin.Part:
+        given.append(deadline.seconds)
+        return dropin.Part(0, np.zeros((0, 3), np.int64), None, None)
+
+    dropin.parts_in_time([dropin.Waiting(100, part), dropin.Waiting(300, part)], 40.0)
+    assert given == [pytest.approx(10.0, rel=0.01), pytest.approx(40.0, rel=0.01)]
+    dropin.parts_in_time([dropin.Waiting(0, part), dropin.Waiting(5, part)], None)
+    assert given[2:] == [None, None]
 
 
 def test_charts_that_are_refused_are_projections_and_the_log_says_so(
