@@ -2,6 +2,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <limits>
+
 #include "conformal.hpp"
 #include "exact.hpp"
 #include "paths.hpp"
@@ -17,6 +19,13 @@ using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
 using Numbers = Array<double>;
 using Indices = Array<Index>;
 using Mask = Array<bool>;
+
+// Indices that are all in [0, bound): a wrong one is an error here too, not a crash.
+static const Indices& checked(const Indices& indices, Index bound = std::numeric_limits<Index>::max()) {
+    for (py::ssize_t i = 0; i < indices.size(); ++i)
+        if (indices.data()[i] < 0 || indices.data()[i] >= bound) throw py::index_error("an index is out of range");
+    return indices;
+}
 
 static Points3 points_of(const Numbers& array) {
     Points3 points(array.shape(0));
@@ -82,7 +91,7 @@ static void define_pieces(py::module_& module) {
     py::class_<Slim>(module, "Slim")
         .def(py::init([](const Numbers& points, const Indices& faces, const Numbers& uv) {
             auto vertices = points_of(points);
-            auto corners = faces_of(faces);
+            auto corners = faces_of(checked(faces, std::min(points.shape(0), uv.shape(0))));
             std::vector<double> start(uv.data(), uv.data() + uv.size());
             py::gil_scoped_release free;
             return Slim(vertices, corners, std::move(start));
@@ -96,11 +105,11 @@ static void define_pieces(py::module_& module) {
             return array_of(slim.uv(), 2);
         });
     module.def("excess_energy", [](const Numbers& points, const Indices& faces, const Numbers& uv, double most) {
-        return excess_energy(points_of(points), faces_of(faces), uv.data(), most);
+        return excess_energy(points_of(points), faces_of(checked(faces, std::min(points.shape(0), uv.shape(0)))), uv.data(), most);
     });
     py::class_<Conformal>(module, "Conformal")
         .def(py::init([](const Numbers& points, const Indices& faces, double least, double steepest) {
-            return Conformal(points_of(points), faces.data(), faces.shape(0), least, steepest);
+            return Conformal(points_of(points), checked(faces, points.shape(0)).data(), faces.shape(0), least, steepest);
         }))
         .def("turn", [](const Conformal& of) { return array_of(of.turn()); })
         .def("fan", [](const Conformal& of) { return array_of(of.fan()); })
@@ -163,6 +172,7 @@ static void define_overlap(py::module_& module) {
 static void define_topology(py::module_& module) {
     module.def("edge_table", [](const Indices& faces) {
         EdgeTable table;
+        checked(faces);
         {
             py::gil_scoped_release free;
             table = edge_table(faces.data(), faces.shape(0));
@@ -173,6 +183,7 @@ static void define_topology(py::module_& module) {
     });
     module.def("opened", [](const Indices& faces, const Indices& halfedges, const Mask& joined) {
         Opened found;
+        checked(faces);
         {
             py::gil_scoped_release free;
             found = opened(faces.data(), faces.shape(0), halfedges.data(), joined.data(), joined.size());
@@ -181,22 +192,25 @@ static void define_topology(py::module_& module) {
     });
     module.def("boundary_loops", [](const Indices& faces) {
         py::list loops;
-        for (const auto& loop : boundary_loops(faces.data(), faces.shape(0))) loops.append(array_of(loop));
+        for (const auto& loop : boundary_loops(checked(faces).data(), faces.shape(0))) loops.append(array_of(loop));
         return loops;
     });
     module.def("boundary_edges", [](const Indices& faces) {
         std::vector<std::array<Index, 2>> found;
-        for (Index half : boundary_halfedges(edge_table(faces.data(), faces.shape(0))))
+        for (Index half : boundary_halfedges(edge_table(checked(faces).data(), faces.shape(0))))
             found.push_back({faces.data()[half], faces.data()[next_halfedge(half)]});
         return pairs_of(found);
     });
     module.def("face_components", [](Index count, const Indices& pairs) {
         Sets sets(count);
+        checked(pairs, count);
         for (py::ssize_t i = 0; i < pairs.shape(0); ++i) sets.join(pairs.data()[2 * i], pairs.data()[2 * i + 1]);
         return array_of(numbered(sets, count));
     });
     module.def("shortest_paths", [](Index count, const Indices& edges, const Numbers& cost, const Indices& sources) {
         Paths found;
+        checked(edges, count);
+        checked(sources, count);
         {
             py::gil_scoped_release free;
             found = shortest_paths(count, edges.data(), cost.data(), cost.size(), sources.data(), sources.size());

@@ -86,3 +86,13 @@ def test_shortest_paths_are_equal(faces: np.ndarray) -> None:
             expected = shortest_paths(count, edges, cost, sources)
         assert found.distance == pytest.approx(expected.distance, abs=1e-12)
         assert np.array_equal(found.parent, expected.parent)
+
+
+def test_a_wrong_index_is_an_error_and_no_crash() -> None:
+    for wrong in ([[0, 1, -1]], [[-5, 1, 2]]):
+        with pytest.raises(IndexError):
+            edge_table(np.array(wrong))
+    with pytest.raises(IndexError):
+        face_components(2, np.array([[0, 2]]))
+    with pytest.raises(IndexError):
+        shortest_paths(2, np.array([[0, 2]]), np.ones(1), np.array([0]))
