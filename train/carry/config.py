@@ -50,7 +50,13 @@ class FineConfig:
     """A part of many faces: thinned to a middle mesh for all but the last step, which carries its charts back."""
 
     faces: int = 20000
-    """Faces of the middle mesh."""
+    """Faces of the middle mesh of a surface in one part; a part gets as many as √(its share of the area) says …"""
+    fewest: int = 6000
+    """… but at least these."""
+    scraps: int = 4
+    """A chart that loses so many scraps, or more, is flattened anew …"""
+    anew: int = 40_000
+    """… where it has no more faces than this."""
     above: float = 1.5
     """Parts of more than so many times as many are thinned."""
     early: int = 3

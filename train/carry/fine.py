@@ -114,7 +114,8 @@ def refined_piece(
             best = found
         if best and (best[0].energy <= allowed or late()):
             break
-    if not best or (best[0].energy > allowed and not late()):
+    torn = len(best) > config.fine.scraps and len(ids) <= config.fine.anew
+    if not best or ((torn or best[0].energy > allowed) and not late()):
         return []
     return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]
 

@@ -148,8 +148,8 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     exact = unfolded_part(surface, charts, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
-    many = len(surface.faces) > config.fine.above * config.fine.faces
-    middle = thinned(surface, config.fine) if many else surface
+    many = len(surface.faces) > config.fine.above * starts.middle
+    middle = thinned(surface, replace(config.fine, faces=starts.middle)) if many else surface
     whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])

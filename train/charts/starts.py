@@ -52,6 +52,12 @@ class Starts:
         return max(plain, self.config.faces_per_handle * self.handles)
 
     @property
+    def middle(self) -> int:
+        """Faces of the middle mesh."""
+        fine = self.config.fine
+        return max(round(fine.faces * np.sqrt(self.share)), min(fine.fewest, fine.faces))
+
+    @property
     def whole(self) -> int:
         """Faces up to which a part that unfolds is searched as it is."""
         return max(round(self.config.whole_faces * np.sqrt(self.share)), self.faces)
