@@ -201,8 +201,9 @@ class State:
         self.place_loose()
 
     def place_loose(self) -> None:
-        """Give all loose flaps away; those that nothing takes become pieces."""
-        loose, self.loose = self.loose, []
-        for flap, owner in loose:
-            if not self.give_away(flap, owner):
-                self.add_valid(flap)
+        """Give all loose flaps away; those that nothing takes become pieces, whose own flaps come after."""
+        while self.loose:
+            loose, self.loose = self.loose, []
+            for flap, owner in loose:
+                if not self.give_away(flap, owner):
+                    self.add_valid(flap)

@@ -235,3 +235,22 @@ def test_slits_are_made_where_they_pay_and_only_in_dear_pieces() -> None:
     (after,) = search.pieces.values()
     assert after.cost(search.price) < before.cost(search.price)
     assert_valid(search)
+
+
+def test_a_flap_that_loses_a_flap_of_its_own_leaves_no_face_without_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    tube = unit("tube", 12)
+    search = search_of(tube)
+    count = len(tube.faces)
+    search.add_valid(np.arange(count - 4))
+    search.loose.append(module.Loose(np.arange(count - 4, count), 0))
+    add_valid = search.add_valid
+
+    def sheds(ids: np.ndarray, *_: object) -> None:
+        if len(ids) > 1:
+            search.loose.append(module.Loose(ids[1:], int(ids[0])))
+        add_valid(ids[:1])
+
+    monkeypatch.setattr(search, "add_valid", sheds)
+    monkeypatch.setattr(search, "give_away", lambda *_: False)
+    search.place_loose()
+    assert (search.label() >= 0).all()
