@@ -86,7 +86,7 @@ class ShortenConfig:
     """… and in a chart of no more excess energy, which unrolls as it is, …"""
     crease: float = 1.05
     """… wherever it is bent by less than so many radians."""
-    least: float = 0.001
+    least: float = 0.0015
     """Gain, as objective, below which a chart stays whole."""
     directions: int = 8
     """Directions in which a straight cut is tried …"""

@@ -101,10 +101,14 @@ def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut |
         return Cut(part, before - waste(max(sides), page, config.shorten) - price * seam)
 
     places = list(straight_cuts(corners, polygon, config.shorten))
-    rough = [cut((place > 0.0).astype(np.int64)).gain for place in places]
-    best = np.argsort(-np.asarray(rough), kind="stable")[: config.shorten.looks]
-    found = [cut(_smooth(places[at], graph, config.shorten)) for at in best.tolist()]
-    paying = [each for each in found if each.gain > config.shorten.least and 0 < each.part.max() < room]
+    straight = [cut((place > 0.0).astype(np.int64)) for place in places]
+    best = np.argsort([-each.gain for each in straight], kind="stable")[: config.shorten.looks].tolist()
+    moved = [cut(_smooth(places[at], graph, config.shorten)) for at in best]
+    paying = [
+        each
+        for each in [*moved, *(straight[at] for at in best)]
+        if each.gain > config.shorten.least and 0 < each.part.max() < room
+    ]
     return max(paying, key=lambda each: each.gain, default=None)
 
 

@@ -63,8 +63,8 @@ def test_the_page_is_that_of_the_whole_surface() -> None:
 
 
 def test_arms_that_branch_are_cut_off_where_they_are_narrow() -> None:
-    """A cross of four arms, ten long and one wide: cut at the joint, never along an arm."""
-    rows = [(x, 0) for x in range(-10, 11)] + [(0, y) for y in range(-10, 11) if y]
+    """A cross of four arms, twenty long and one wide: cut at the joint, never along an arm."""
+    rows = [(x, 0) for x in range(-20, 21)] + [(0, y) for y in range(-20, 21) if y]
     corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     places, index = np.unique((np.array(rows)[:, None] + corner).reshape(-1, 2), axis=0, return_inverse=True)
     quads = index.reshape(-1, 4)
