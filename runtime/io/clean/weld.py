@@ -22,6 +22,8 @@ WELD_TOLERANCE = 1e-8
 """× bounding-box diagonal: under the spacing of float32 numbers of that size (6e-8), so no real detail is lost."""
 WELD_SHARE = 1e-2
 """× the longest edge around a vertex: a part far smaller than the whole keeps its vertices apart."""
+ROUNDED_UP = 1.0 + 1e-9
+"""× a distance that a finer test follows."""
 SLIVER_TOLERANCE = 1e-14
 """× squared longest edge: 45 float64 roundings, where the cross product no longer has a true digit."""
 SMALLEST_DIAGONAL = 1e-100
@@ -57,11 +59,14 @@ def weld_vertices(
     group = equal_rows(rows)
     first = first_of_each(group)
     distinct = positions[first]
-    pairs = KDTree(distinct).query_pairs(WELD_TOLERANCE * diagonal, output_type="ndarray")
+    farthest = None if faces is None else longest_edges(distinct, group[faces])
+    near = WELD_TOLERANCE * diagonal
+    if farthest is not None:  # one part far away makes all others near: no more pairs than edges allow
+        near = min(near, ROUNDED_UP * WELD_SHARE * float(farthest.max(initial=0.0)))
+    pairs = KDTree(distinct).query_pairs(near, output_type="ndarray")
     if body is not None:
         pairs = pairs[body[first[pairs[:, 0]]] == body[first[pairs[:, 1]]]]
-    if len(pairs) and faces is not None:
-        farthest = longest_edges(distinct, group[faces])
+    if len(pairs) and farthest is not None:
         apart = np.linalg.norm(distinct[pairs[:, 0]] - distinct[pairs[:, 1]], axis=1)
         pairs = pairs[apart <= WELD_SHARE * farthest[pairs].min(axis=1)]
     if len(pairs):

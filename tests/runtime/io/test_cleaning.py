@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.clean import weld
 from flexpara.runtime.io.clean.clean import clean
 from flexpara.runtime.io.clean.orient import inconsistent_faces
 from flexpara.runtime.io.clean.weld import degenerate_faces, weld_vertices
@@ -213,3 +214,18 @@ def test_uv_that_are_not_finite_become_0_and_are_counted() -> None:
     asset = clean(RawMesh(positions=TRIANGLE, faces=np.array([[0, 1, 2]]), uv=uv))
     assert asset.changes == {"uv_not_finite": 2}
     np.testing.assert_array_equal(asset.uv, [[0.5, 0.5], [0, 0], [0, 0]])
+
+
+def test_a_part_far_away_does_not_make_all_others_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+
+    class Tree(weld.KDTree):
+        def query_pairs(self, r: float, *args: object, **kwargs: object) -> object:
+            asked.append(r)
+            return super().query_pairs(r, *args, **kwargs)  # pyright: ignore[reportArgumentType,reportCallIssue]
+
+    monkeypatch.setattr(weld, "KDTree", Tree)
+    positions = np.concatenate([SQUARE, SQUARE + 1e15])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    assert len(set(weld_vertices(positions, faces).tolist())) == 8
+    assert asked[0] < 0.1
