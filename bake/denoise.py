@@ -60,4 +60,4 @@ def nearby_range(
     size = (2 * NEAR + 1, 2 * NEAR + 1, 1)
     low = ndimage.minimum_filter(np.where(covered[..., None], image, np.float32(np.inf)), size, mode="nearest")
     high = ndimage.maximum_filter(np.where(covered[..., None], image, np.float32(-np.inf)), size, mode="nearest")
-    return low, np.maximum(low, high)
+    return np.asarray(low, np.float32), np.maximum(low, high).astype(np.float32)

@@ -62,7 +62,7 @@ def at_faces(out: Path, stem: str) -> NDArray[np.uint8]:
     assert made.uv is not None
     middle = made.uv[made.faces].mean(axis=1)
     column, row = (middle[:, 0] * 128).astype(int), ((1 - middle[:, 1]) * 128).astype(int)
-    return picture[row, column, :3]
+    return np.asarray(picture[row, column, :3], np.uint8)
 
 
 def test_face_colours_reach_the_texture(tmp_path: Path) -> None:

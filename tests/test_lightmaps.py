@@ -9,6 +9,7 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from trimesh.visual import TextureVisuals
 
 from flexpara.__main__ import main
 from flexpara.runtime.geometry.metrics import measure
@@ -26,7 +27,7 @@ SIZE = 128
 @pytest.mark.parametrize("target", ["unity", "unreal", "godot"])
 def test_light_map_uv_follow_the_engine(tmp_path: Path, target: str) -> None:
     mesh = trimesh.creation.box((3.0, 2.0, 1.0))
-    mesh.visual = trimesh.visual.TextureVisuals(uv=np.tile([[0.25, 0.5]], (len(mesh.vertices), 1)))
+    mesh.visual = TextureVisuals(uv=np.tile([[0.25, 0.5]], (len(mesh.vertices), 1)))
     mesh.export(tmp_path / "crate.glb")
     argv = ["unwrap", str(tmp_path / "crate.glb"), "-o", str(tmp_path / "out"), "--uv-set", "1", "--maps", "ao"]
     assert main([*argv, "--target", target, "--size", str(SIZE), "--no-preview", "--quiet"]) == 0
