@@ -47,7 +47,7 @@ def scan(resolution: int) -> Mesh:
 
 def gyroid(cells: int) -> Mesh:
     """A thick gyroid by marching cubes: closed, with a tunnel for each opening, and the slivers that they leave."""
-    from skimage.measure import marching_cubes  # of the extra `bench`
+    from skimage.measure import marching_cubes  # of the extra `bench`  # pyright: ignore[reportMissingImports]
 
     x, y, z = np.meshgrid(*[np.linspace(-np.pi, np.pi, cells)] * 3, indexing="ij")
     sheet = np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)) - 0.5
