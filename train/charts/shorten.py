@@ -89,7 +89,7 @@ def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut |
     exact = piece.energy <= config.shorten.exact
     graph = graph_of(flat, polygon, config.shorten.crease if exact else config.planar.bent, config)
     price, corners = config.slit.price / page.side, piece.flat.uv[flat.faces]
-    rim: NDArray[np.bool_] = np.isin(flat.faces, boundary_edges(flat.faces)).any(axis=1)
+    rim = np.isin(flat.faces, boundary_edges(flat.faces)) @ np.ones(3) > 0.0
 
     def cut(label: NDArray[np.int64]) -> Cut:
         part = connected_pieces(label, graph)
