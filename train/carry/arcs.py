@@ -82,7 +82,7 @@ class Straightening:
     def __init__(self, search: Search, arcs: list[Arc]) -> None:
         self.search, self.arcs = search, arcs
         self.plain, self.label = seam_edges(search), search.label()
-        self.known: dict[tuple[int, frozenset[int]], Laid] = {}
+        self.known: dict[tuple[int, frozenset[int]], tuple[NDArray[np.int64], Laid]] = {}
         self.failed: set[int] = set()
 
     def run(self, rounds: int) -> Search:
@@ -122,7 +122,7 @@ class Straightening:
         made = parallel_map(lambda job: self.piece(*job, seam), list(zip(owner, sides, strict=True)))
         found = Search(self.search.surface, self.search.graph, self.search.config)
         for key, ids, (name, laid) in zip(owner, sides, made, strict=True):
-            self.known[key, name] = laid
+            self.known[key, name] = ids, laid
             if isinstance(laid, Piece) and self.search.is_bearable(laid):
                 found.add(laid)
             else:
@@ -140,12 +140,12 @@ class Straightening:
 
     def piece(self, key: int, ids: NDArray[np.int64], seam: NDArray[np.bool_]) -> tuple[frozenset[int], Laid]:
         """What becomes of a piece, once for the same arcs beside it; and their names."""
-        name = frozenset(id(arc) for arc in self.arcs if key in arc.sides)
-        if not name:
-            return name, self.search.pieces[key]
-        if (key, name) in self.known:
-            return name, self.known[key, name]
-        return name, laid_alike(self.search, ids, seam, self.search.pieces[key])
+        name, source = frozenset(id(arc) for arc in self.arcs if key in arc.sides), self.search.pieces[key]
+        before, laid = self.known.get((key, name), (ids, None)) if name else (np.sort(source.ids), source)
+        # an arc beside neither may still take faces of this piece, where ways of several meet
+        if np.array_equal(before, ids) and (not name or (key, name) in self.known):
+            return name, laid
+        return name, laid_alike(self.search, ids, seam, source)
 
     def gains(self, found: Search) -> NDArray[np.float64]:
         """(n,) what each arc lowers the objective by: its length saves, the energy that faces near it gained costs."""
