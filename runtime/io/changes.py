@@ -36,7 +36,7 @@ WORDS = {
     "non_manifold_edges": "{} with three faces or more, cut there|edge|edges",
     "points_without_normal": "{} without a normal in a cloud that has them|point|points",
     "polygons_as_triangles": "{} of over three corners written as triangles|polygon|polygons",
-    "polygons_cut": "{} cut by seams, written as triangles|polygon|polygons",
+    "polygons_cut": "{} cut by seams or covered by no fan, written as triangles|polygon|polygons",
     "repaired_normals": "{} of no length or not finite replaced|normal|normals",
     "skipped_animations": "{} left out|animation|animations",
     "skipped_cameras": "{} left out|camera|cameras",

@@ -5,7 +5,7 @@ c corners of all polygons of the file, one polygon after the other · p polygons
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +23,9 @@ class Loops:
     """Polygons as they are written, in the order of the file.
 
     size: (m,) int64 corners of each.  vertex: atlas vertex of each corner of all.  corner: the corner of the file that
-    each is.  polygon: (m,) the file's polygon that each is of.  cut: how many of the file's polygons a seam cuts,
-    which are written as triangles.
+    each is.  polygon: (m,) the file's polygon that each is of.  cut: how many of the file's polygons are written as
+    triangles: those that a seam cuts, and those that no fan covers, whichever corner it starts from.  Many readers
+    know fans only.
     """
 
     size: NDArray[np.int64]
@@ -60,6 +61,24 @@ def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons
     broken |= turned != turned[first[polygon]]
     cut = np.zeros(len(polygons.size), dtype=np.bool_)
     cut[polygon[broken]] = True
+    loops = _uncut(faces, own, polygons, turned, cut)
+    starts = _fan_starts(uv, loops)
+    if not starts:
+        return loops
+    cut[[loops.polygon[loop] for loop, start in starts.items() if start < 0]] = True
+    turns = {int(loops.polygon[loop]): start for loop, start in starts.items() if start > 0}
+    return _turned_to(_uncut(faces, own, polygons, turned, cut), turns)
+
+
+def _uncut(
+    faces: NDArray[np.int64],
+    own: NDArray[np.int64],
+    polygons: Polygons,
+    turned: NDArray[np.bool_],
+    cut: NDArray[np.bool_],
+) -> Loops:
+    """Loops of the polygons that are not cut (p,), triangles of the others.  own: (c,) vertices of the corners."""
+    corner, polygon = polygons.corner, polygons.of_faces
     of_corner = np.repeat(np.arange(len(polygons.size)), polygons.size)
     kept = np.flatnonzero((own >= 0) & ~cut[of_corner])
     backward = np.zeros(len(polygons.size), dtype=np.bool_)
@@ -75,6 +94,36 @@ def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons
     start = np.cumsum(size) - size
     spread = np.repeat(start[sort], size[sort]) + _counting(size[sort])
     return Loops(size[sort], vertex[spread], places[spread], number[sort], int(cut.sum()))
+
+
+def _fan_starts(uv: NDArray[np.float32], loops: Loops) -> dict[int, int]:
+    """Loop → the corner from which its fan lies right in the plane, or −1, for loops whose own fan does not."""
+    points = uv[loops.vertex].astype(np.float64)
+    a, b, c = points[fans(loops.size)[0].T]
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    first, found = np.cumsum(loops.size) - loops.size, dict[int, int]()
+    owner = fans(loops.size)[1]
+    facing = np.sign(np.bincount(owner, area, minlength=len(loops.size)))  # uv of others may be mirrored
+    for loop in np.unique(owner[area * facing[owner] < 0.0]).tolist():
+        ring = points[first[loop] : first[loop] + loops.size[loop]]
+        found[loop] = next((start for start in range(len(ring)) if _is_fan(np.roll(ring, -start, axis=0))), -1)
+    return found
+
+
+def _is_fan(ring: NDArray[np.float64]) -> bool:
+    """Whether the fan of a ring (n, 2) from its first corner turns nowhere."""
+    spokes = ring[1:] - ring[0]
+    area = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
+    return bool((area >= 0.0).all() or (area <= 0.0).all())
+
+
+def _turned_to(loops: Loops, starts: dict[int, int]) -> Loops:
+    """The loops, those of some polygons beginning at another corner."""
+    order, first = np.arange(len(loops.vertex)), np.cumsum(loops.size) - loops.size
+    for loop in np.flatnonzero(np.isin(loops.polygon, list(starts))).tolist():
+        whole = slice(first[loop], first[loop] + loops.size[loop])
+        order[whole] = np.roll(order[whole], -starts[int(loops.polygon[loop])])
+    return replace(loops, vertex=loops.vertex[order], corner=loops.corner[order])
 
 
 def _turned(corner: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from flexpara.runtime.io.clean.clean import clean
 from flexpara.runtime.io.loops import loops_of
@@ -82,3 +85,33 @@ def test_triangles_are_loops_of_three() -> None:
     loops = loops_of(atlas_of(asset), bare)
     assert set(loops.size.tolist()) == {3}
     np.testing.assert_array_equal(loops.triangles, asset.faces)
+
+
+def flat_atlas_of(asset: Asset, mirror: float = 1.0) -> Atlas:
+    """Uv are the positions, x mirrored where asked."""
+    return replace(atlas_of(asset), uv=(asset.positions[:, :2] * [mirror, 1.0]).astype(np.float32))
+
+
+BENT = "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n"
+"""An L from a corner whose fan turns inside out; the fan from (1, 1) does not."""
+ZIGZAG = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (4, 0), (4, 3), (3, 3), (3, 1), (1, 1), (1, 3), (0, 3)])
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_concave_polygon_begins_where_its_fan_lies_right(mirror: float) -> None:
+    asset = asset_of(BENT)
+    loops = loops_of(flat_atlas_of(asset, mirror), asset)
+    assert (loops.size.tolist(), loops.cut) == ([6], 0)
+    assert asset.positions[loops.vertex[0]].tolist() == [1, 1, 0]
+    assert sorted(loops.corner.tolist()) == list(range(6))
+
+
+def test_a_polygon_that_no_fan_covers_becomes_triangles() -> None:
+    asset = asset_of(ZIGZAG + "f 1 2 3 4 5 6 7 8\n")
+    loops = loops_of(flat_atlas_of(asset), asset)
+    assert loops.cut == 1
+    assert set(loops.size.tolist()) == {3}
+    points = asset.positions[loops.vertex].reshape(-1, 3, 3)
+    area = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])[:, 2] / 2.0
+    assert (area > 0.0).all()
+    assert area.sum() == pytest.approx(8.0)
