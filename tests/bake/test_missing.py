@@ -51,4 +51,4 @@ def test_a_missing_package_is_named_with_its_remedy(package: str, module: str) -
 
 
 def test_the_check_can_fail() -> None:
-    assert imported_without("moderngl", "color") == "imported\n"
+    assert imported_without("moderngl", "colors.color") == "imported\n"
