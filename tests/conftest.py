@@ -16,8 +16,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import flexpara.train  # noqa: F401  # before torch, whose threads it tells how to wait
+from flexpara.runtime.samples import make_sample
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from flexpara.runtime.deadline import Deadline
     from flexpara.runtime.mesh import Surface
     from flexpara.runtime.progress import Progress
@@ -72,6 +75,26 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("standins")
     sibling("standins").write_standins(folder)
     return folder
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """An OBJ file of two quads on half of a texture: the first red, the second blue."""
+    return sibling("house").write_house(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def write_samples() -> Callable[[Path, Sequence[str]], Path]:
+    """Writes NAME.obj of coarse samples into a folder, and gives the folder back."""
+
+    def write(folder: Path, names: Sequence[str]) -> Path:
+        for name in names:
+            vertices, faces = make_sample(name, resolution=4)
+            lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+            (folder / f"{name}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return folder
+
+    return write
 
 
 @pytest.fixture(scope="session")

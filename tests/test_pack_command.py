@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
 
 import flexpara
 from flexpara.__main__ import main
@@ -21,29 +20,6 @@ pytest.importorskip("moderngl")
 
 from flexpara.bake.files.images import read_image
 
-HOUSE = """mtllib house.mtl
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 3 0 0
-v 4 0 0
-v 4 1 0
-v 3 1 0
-vt 0 0
-vt 0.5 0
-vt 0.5 0.5
-vt 0 0.5
-vt 0.5 0.5
-vt 1 0.5
-vt 1 1
-vt 0.5 1
-o wall
-usemtl paint
-f 1/1 2/2 3/3 4/4
-o roof
-f 5/5 6/6 7/7 8/8
-"""
 PLATE = """ply
 format ascii 1.0
 element vertex 4
@@ -64,18 +40,6 @@ end_header
 RED, BLUE = (255, 0, 0), (0, 0, 255)
 
 
-@pytest.fixture
-def house(tmp_path: Path) -> Path:
-    """Two quads on half of a texture: the first red, the second blue."""
-    path = tmp_path / "house.obj"
-    path.write_text(HOUSE, encoding="utf-8")
-    (tmp_path / "house.mtl").write_text("newmtl paint\nmap_Kd house.png\n", encoding="utf-8")
-    pixels = np.zeros((64, 64, 3), np.uint8)
-    pixels[32:, :32], pixels[:32, 32:] = RED, BLUE
-    Image.fromarray(pixels).save(tmp_path / "house.png")
-    return path
-
-
 def packed(*meshes: Path, out: Path, words: tuple[str, ...] = ()) -> int:
     return main(["pack", *map(str, meshes), "-o", str(out), "--size", "64", "--quiet", *words])
 
@@ -91,7 +55,7 @@ def test_an_obj_stays_an_obj_line_by_line_and_its_texture_moves(house: Path, tmp
     assert packed(house, out=tmp_path / "out") == 0
     lines = (tmp_path / "out" / "house.obj").read_text(encoding="utf-8").splitlines()
     assert [line for line in lines if line.startswith(("v ", "o "))] == [
-        line for line in HOUSE.splitlines() if line.startswith(("v ", "o "))
+        line for line in house.read_text(encoding="utf-8").splitlines() if line.startswith(("v ", "o "))
     ]
     assert sum(line.startswith("f ") for line in lines) == 2
     made = load_asset(tmp_path / "out" / "house.obj")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygltflib
 import pytest
-from PIL import Image
 
 from flexpara.__main__ import main
 from flexpara.runtime.io.meshfile import load_asset
@@ -20,42 +19,7 @@ pytest.importorskip("moderngl")
 
 from flexpara.bake.files.images import read_image
 
-HOUSE = """mtllib house.mtl
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 3 0 0
-v 4 0 0
-v 4 1 0
-v 3 1 0
-vt 0 0
-vt 0.5 0
-vt 0.5 0.5
-vt 0 0.5
-vt 0.5 0.5
-vt 1 0.5
-vt 1 1
-vt 0.5 1
-o wall
-usemtl paint
-f 1/1 2/2 3/3 4/4
-o roof
-f 5/5 6/6 7/7 8/8
-"""
 RED, BLUE = (255, 0, 0), (0, 0, 255)
-
-
-@pytest.fixture
-def house(tmp_path: Path) -> Path:
-    """Two quads on half of a texture: the first red, the second blue."""
-    path = tmp_path / "house.obj"
-    path.write_text(HOUSE, encoding="utf-8")
-    (tmp_path / "house.mtl").write_text("newmtl paint\nmap_Kd house.png\n", encoding="utf-8")
-    pixels = np.zeros((64, 64, 3), np.uint8)
-    pixels[32:, :32], pixels[:32, 32:] = RED, BLUE
-    Image.fromarray(pixels).save(tmp_path / "house.png")
-    return path
 
 
 def packed(path: Path, out: Path, *words: str) -> int:

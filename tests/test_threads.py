@@ -7,11 +7,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from flexpara.runtime.cores import LIMIT
-from flexpara.runtime.samples import make_sample
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENIMAGEIO_THREADS", "LP_NUM_THREADS")
 KINDS = ("torus", "bracket")
@@ -31,13 +34,8 @@ def written(meshes: Path, output: Path, order: tuple[str, ...], threads: int) ->
 
 
 @pytest.fixture(scope="module")
-def meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("meshes")
-    for kind in KINDS:
-        vertices, faces = make_sample(kind, resolution=4)
-        lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
-        (folder / f"{kind}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return folder
+def meshes(tmp_path_factory: pytest.TempPathFactory, write_samples: Callable[[Path, Sequence[str]], Path]) -> Path:
+    return write_samples(tmp_path_factory.mktemp("meshes"), KINDS)
 
 
 def test_threads_and_order_change_no_byte(meshes: Path, tmp_path: Path) -> None:

@@ -24,10 +24,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from flexpara.runtime.samples import make_sample
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 KEPT = ("manifest.jsonl", "index.html", ".batch.lock")
 """What every run leaves beside its results."""
@@ -38,13 +36,8 @@ KINDS = ("sphere", "bracket", "torus")
 
 
 @pytest.fixture(scope="module")
-def meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("meshes")
-    for kind in KINDS:
-        vertices, faces = make_sample(kind, resolution=4)
-        lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
-        (folder / f"{kind}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return folder
+def meshes(tmp_path_factory: pytest.TempPathFactory, write_samples: Callable[[Path, Sequence[str]], Path]) -> Path:
+    return write_samples(tmp_path_factory.mktemp("meshes"), KINDS)
 
 
 def begun(meshes: Path, output: Path, *more: str, environment: dict[str, str] | None = None) -> subprocess.Popen[str]:
