@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from . import runtime as runtime
     from . import train as train
     from .bake.repack.repacked import pack as pack
-    from .export import xatlas as xatlas
     from .export.assemble import Unwrapped
+    from .export.dropin import xatlas as xatlas
     from .export.tensors import Tensors
     from .runtime.files import OutputFolder
     from .runtime.io.meshfile import MeshLike
@@ -125,7 +125,7 @@ def unwrap_asset(
 
     with requires("unwrap"):
         from .export.assemble import assemble
-        from .runtime.io.shading import shaded
+        from .runtime.io.asset.shading import shaded
         from .runtime.pack.square import square_of
         from .train.presets import train_asset
 
@@ -136,7 +136,7 @@ def unwrap_asset(
 def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapPages:
     """The asset's pages, shaded as one mesh, each as `unwrap_asset`.  Raises: as that."""
     from .runtime.extras import requires
-    from .runtime.io.shading import shaded
+    from .runtime.io.asset.shading import shaded
     from .runtime.progress import Clock
 
     with requires("bake"):
@@ -194,7 +194,7 @@ class UnwrapResult(Saving):
     @property
     def atlas(self) -> Atlas:
         """Packed charts; source_vertex counts the vertices of the file, not those that normals split."""
-        from .runtime.io.shading import with_file_vertices
+        from .runtime.io.asset.shading import with_file_vertices
 
         return with_file_vertices(self.found.atlas, self.asset)
 
@@ -257,7 +257,7 @@ class UnwrapResult(Saving):
         from .bake.checks import check_outputs, chosen_maps
         from .bake.results.output import BakeJob, result_notes, write_outputs, write_reports
         from .export.assemble import write_networks
-        from .runtime.io.changes import lost, told
+        from .runtime.io.asset.changes import lost, told
         from .runtime.io.points.written import point_files, write_points
         from .runtime.progress import Clock
 

@@ -191,7 +191,7 @@ def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
     if run.options.pages > 1:
         run.outputs.for_pages()
     if run.options.atlas != SHARINGS[0]:
-        from .runtime.io.pages import pages_of
+        from .runtime.io.asset.pages import pages_of
 
         with requires("bake"):
             from .bake.files.gltfmade import with_document
@@ -203,7 +203,7 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     """One unwrap, from its beginning or its last checkpoint."""
     from .runtime.files import OutputFolder
     from .runtime.io.anyfile import load_any
-    from .runtime.io.changes import lost
+    from .runtime.io.asset.changes import lost
     from .runtime.mesh import Asset
 
     chosen_maps(run.outputs)
@@ -261,8 +261,8 @@ def export(
     options = replace(options, padding=_padding(options, outputs))
     chosen_maps(outputs)
     from .runtime.files import OutputFolder
-    from .runtime.io.changes import lost
-    from .runtime.io.shading import shaded
+    from .runtime.io.asset.changes import lost
+    from .runtime.io.asset.shading import shaded
 
     asset = shaded(load(mesh, options.select), options.crease_angle)
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:

@@ -106,8 +106,8 @@ def bake(
     high = _high_source(source, options.crease_angle)
     chosen_maps(options.outputs, high=high)
     from ..runtime.files import OutputFolder
+    from ..runtime.io.asset.shading import shaded
     from ..runtime.io.meshfile import load
-    from ..runtime.io.shading import shaded
 
     asset = shaded(load(mesh, options.select), options.crease_angle)
     console.note_changes(asset)
@@ -188,8 +188,8 @@ def _high_source(options: HighOptions, crease_angle: float) -> HighSource | None
     with requires("bake"):
         from .highpoly.cage import CageSettings
         from .highpoly.highmaps import HighSource
+    from ..runtime.io.asset.shading import shaded
     from ..runtime.io.meshfile import load_asset
-    from ..runtime.io.shading import shaded
 
     try:
         cage = CageSettings(float(options.cage), match_names=options.match_names)

@@ -1,5 +1,5 @@
-"""The ONNX files of an unwrap, self-describing, proven equal to the networks; and what is assembled around them.
+"""The second half of an unwrap: pack, measure, export; and the ONNX files, proven equal to their networks.
 
-Public face: `assemble.assemble`.  `onnxfile` writes the deployed networks, `wrapfile` their inverse, `torchfile` the
-networks of preset paper.
+Public face: `assemble.assemble`.  `deploy` writes the deployed networks and their inverse, `paper` those of preset
+paper, both of what `graph` has; `dropin` is `flexpara.xatlas`.
 """

@@ -24,8 +24,8 @@ from ..train.charts.recut import recut
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.polygons import whole_polygons
-from .metadata import PlacedCharts, Provenance
-from .onnxfile import export_networks
+from .deploy.onnxfile import export_networks
+from .graph.metadata import PlacedCharts, Provenance
 
 if TYPE_CHECKING:
     from torch import nn
@@ -140,7 +140,7 @@ def invert(asset: Asset, found: Unwrapped, clock: Clock) -> tuple[bytes, dict[st
     from ..runtime.sessions.wrapagreement import inverse_agreement
     from ..runtime.sessions.wrapsession import WrapSession
     from ..train.deploy.fit_wrap import fit_wrap
-    from .wrapfile import export_wrap
+    from .deploy.wrapfile import export_wrap
 
     ball = Surface(found.frame.apply(asset.surface.vertices), asset.surface.faces)
     settings = found.report["settings"]
@@ -173,6 +173,6 @@ def write_networks(
 
 def _paper_file(model: nn.Module, asset: Asset, frame: Frame, size: int, facts: Provenance) -> bytes:
     """The networks of preset paper as they were trained; torch is loaded for them alone."""
-    from .raw import raw_onnx
+    from .paper.raw import raw_onnx
 
     return raw_onnx(model, asset.surface, frame, size, facts)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..runtime.io.pages import pages_of, part_of
+from ..runtime.io.asset.pages import pages_of, part_of
 from ..runtime.mesh import Surface
 from ..runtime.pack.asked import some_charts
 from ..runtime.pack.pages import pack_pages

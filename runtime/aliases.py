@@ -1,4 +1,4 @@
-"""Modules that are found by a second name: `flexpara.xatlas` is `flexpara.export.xatlas`.
+"""Modules that are found by a second name: `flexpara.xatlas` is `flexpara.export.dropin.xatlas`.
 
 A file xatlas.py beside `__init__.py` would take the place of the real xatlas wherever Python runs in this folder.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 PACKAGE = __name__.removesuffix(".runtime.aliases")
-HOMES = {f"{PACKAGE}.xatlas": f"{PACKAGE}.export.xatlas"}
+HOMES = {f"{PACKAGE}.xatlas": f"{PACKAGE}.export.dropin.xatlas"}
 
 
 class SameModule(Loader):

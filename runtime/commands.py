@@ -57,8 +57,8 @@ def evaluate(
         AtlasOptions(size=size)
     from .files import write_whole
     from .geometry.metrics import measure
+    from .io.formats.npz import write_faces
     from .io.meshfile import load
-    from .io.npz import write_faces
 
     asset = load(mesh)
     if asset.uv is None:

@@ -62,7 +62,7 @@ class Console:
 
         Raises: InputError that names them all, when strict.
         """
-        from .io.changes import told
+        from .io.asset.changes import told
 
         self.demand_none(source.stem, told({**source.changes, **(lost or {})}))
 

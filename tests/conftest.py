@@ -118,7 +118,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
     pytest.importorskip("torch")
     import numpy as np
 
-    from flexpara.runtime.io.wantedseams import NO_WISH, WantedSeams
+    from flexpara.runtime.io.asset.wantedseams import NO_WISH, WantedSeams
     from flexpara.runtime.mesh import Charts, Frame, Surface
     from flexpara.runtime.progress import Clock
     from flexpara.train import presets

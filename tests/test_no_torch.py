@@ -97,5 +97,5 @@ def test_the_whole_runtime_is_looked_at() -> None:
 
 
 def test_export_without_onnx_says_how_to_get_it() -> None:
-    done = blocked(["flexpara.export.builder"], ("onnx",))
+    done = blocked(["flexpara.export.graph.builder"], ("onnx",))
     assert "MissingDependencyError: onnx is missing, export needs it; pip install" in done.stderr

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..runtime.geometry.places import priced_places
 from ..runtime.geometry.topology import edge_table, split_non_manifold_vertices
-from ..runtime.io.wantedseams import NO_WISH
+from ..runtime.io.asset.wantedseams import NO_WISH
 from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
 from .charts.charts import Finished, chart_surface, priced
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ..runtime.deadline import Deadline
     from ..runtime.geometry.places import PlaceConfig
-    from ..runtime.io.wantedseams import WantedSeams
+    from ..runtime.io.asset.wantedseams import WantedSeams
     from ..runtime.progress import Progress
     from .config import FinishConfig, TrainConfig
     from .deploy.gated import GatedExperts

@@ -9,7 +9,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ..runtime.extras import requires
-from ..runtime.io.wantedseams import wanted_seams
+from ..runtime.io.asset.wantedseams import wanted_seams
 from ..runtime.mesh import Frame
 from .charts.charts import priced
 from .charts.kept import kept_islands

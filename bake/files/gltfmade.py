@@ -16,7 +16,7 @@ from ...runtime.io.gltf.buffers import GltfFile
 from ...runtime.io.gltf.document import Document, Part
 from ...runtime.io.gltf.editing import Editing
 from ...runtime.io.gltf.nodes import Placement
-from ...runtime.io.pictures import png_of
+from ...runtime.io.pictures.pictures import png_of
 from ...runtime.pack.exact.seamvertices import atlas_normals
 from .gltf import centre_of, flip_v, linear_shorts
 from .gltfmaterial import STRENGTH

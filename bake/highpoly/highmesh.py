@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.geometry.triangles import signed_areas, triangle_areas
-from ...runtime.io.shading import shaded
+from ...runtime.io.asset.shading import shaded
 from ...runtime.material import Material
 from ...runtime.mesh import Asset, Atlas, Surface
 from ...runtime.options.unwrap import SourceOptions

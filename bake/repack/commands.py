@@ -43,9 +43,9 @@ def pack(
     light = outputs.uv_set is not None
     options = replace(options, padding=padding_of(options.padding, outputs.target, options.size, light=light))
     from ...runtime.files import OutputFolder
-    from ...runtime.io.changes import lost, told
+    from ...runtime.io.asset.changes import lost, told
+    from ...runtime.io.asset.shading import shaded
     from ...runtime.io.meshfile import load
-    from ...runtime.io.shading import shaded
 
     with requires("bake"):
         from .repacked import TOGETHER, pack_assets

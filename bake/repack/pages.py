@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.errors import InputError
-from ...runtime.io.pages import part_of
+from ...runtime.io.asset.pages import part_of
 from ...runtime.options.unwrap import SCENES
 from ...runtime.pack.packing import atlas_of_corners
 from ...runtime.pack.pages import ACROSS

@@ -100,7 +100,7 @@ class PackResult:
         self, output: OutputFolder, outputs: PackOutputs, clock: Clock, note: Callable[[str], None] = lambda _: None
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact that a user should know."""
-        from ...runtime.io.changes import told
+        from ...runtime.io.asset.changes import told
         from .pages import write_on_pages, write_on_tiles
 
         if self.page is not None:
@@ -137,8 +137,8 @@ def pack(
     Raises:
         InputError: a mesh or an option is wrong, or a mesh has no uv.
     """
+    from ...runtime.io.asset.shading import shaded
     from ...runtime.io.meshfile import load
-    from ...runtime.io.shading import shaded
 
     options = from_keywords(PackOptions, options, keywords)
     assets = [shaded(load(entry, options.select), options.crease_angle) for entry in mesh]

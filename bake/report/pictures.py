@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from ...runtime.errors import FlexparaError, InputError
-from ...runtime.io.pictures import demand_texels, inside
+from ...runtime.io.pictures.pictures import demand_texels, inside
 from ..colors.color import srgb_from_linear
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
-from ...runtime.io.changes import told
+from ...runtime.io.asset.changes import told
 from .pictures import picture_file
 from .shape import FaceFacts, Shape, face_facts
 from .words import number_of

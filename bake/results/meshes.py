@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.extras import requires
+from ...runtime.io.formats.npz import write_npz
 from ...runtime.io.gltf.instances import every_instance
 from ...runtime.io.loops import loops_of
-from ...runtime.io.npz import write_npz
 from ...runtime.material import used_materials
 from ...runtime.options.unwrap import SCENES
 

@@ -17,16 +17,16 @@ import numpy as np
 from ..errors import InputError, MeshError, MissingFileError, ShapeError
 from ..mesh import Asset
 from .clean.clean import clean
-from .colors import as_rgba
+from .formats.off import read_off
+from .formats.stl import read_stl
 from .gltf.scene import read_gltf
 from .limits import limits, raised
 from .obj.read import read_obj
-from .off import read_off
-from .pictures import read_in_folder
+from .pictures.colors import as_rgba
+from .pictures.pictures import read_in_folder
 from .ply.read import read_ply
 from .points.cloudfile import is_cloud
 from .rawmesh import RawMesh, unit_vectors
-from .stl import read_stl
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -151,6 +151,6 @@ def _read(data: bytes, path: Path, gltf: Callable[[], RawMesh]) -> RawMesh:
     }
     if kind in readers:
         return readers[kind]()
-    from .others import read_with_trimesh  # the formats above do without trimesh, whose import takes 0.6 s
+    from .formats.others import read_with_trimesh  # the formats above do without trimesh, whose import takes 0.6 s
 
     return read_with_trimesh(data, path)

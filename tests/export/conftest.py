@@ -10,8 +10,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from flexpara.export.metadata import PlacedCharts, Provenance, bundle_metadata
-from flexpara.export.parity import probe_points
+from flexpara.export.graph.metadata import PlacedCharts, Provenance, bundle_metadata
+from flexpara.export.graph.parity import probe_points
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.bundle import BundleMetadata
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from flexpara.export.metadata import PlacedCharts
-from flexpara.export.onnxfile import export_networks
-from flexpara.export.wrapfile import export_wrap
+from flexpara.export.deploy.onnxfile import export_networks
+from flexpara.export.deploy.wrapfile import export_wrap
+from flexpara.export.graph.metadata import PlacedCharts
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Frame, Surface
 from flexpara.runtime.pack.packing import pack

@@ -114,7 +114,8 @@ def warm_up() -> None:
     import trimesh
 
     from flexpara.bake.report import gather
-    from flexpara.runtime.io import anyfile, others
+    from flexpara.runtime.io import anyfile
+    from flexpara.runtime.io.formats import others
     from flexpara.runtime.sessions import session, wrapsession
     from flexpara.train import saved
     from flexpara.train.paper import checkpoint

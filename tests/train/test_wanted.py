@@ -10,8 +10,8 @@ import pytest
 pytest.importorskip("igl")
 
 from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.io.asset.wantedseams import torn, wanted_seams
 from flexpara.runtime.io.meshfile import asset_from_arrays
-from flexpara.runtime.io.wantedseams import torn, wanted_seams
 from flexpara.runtime.options.seams import SeamOptions
 from flexpara.runtime.options.unwrap import TrainOptions
 from flexpara.runtime.progress import Clock

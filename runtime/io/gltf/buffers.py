@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import MeshError
 from ..limits import limits
-from ..pictures import inside
+from ..pictures.pictures import inside
 from ..rawmesh import to_float64
 from .compression import DRACO, MESHOPT, decode_view, meshopt_of
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import MeshError, MissingDependencyError
 from ...material import SLOTS, UNTURNED, Material, Picture
-from ..ktx2 import decode_ktx2
-from ..pictures import decode_image
+from ..pictures.ktx2 import decode_ktx2
+from ..pictures.pictures import decode_image
 from ..text import finite
 from .buffers import GltfFile, buffer_view, read_resource
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import MeshError
-from ..colors import linear_to_srgb
 from ..limits import limits
+from ..pictures.colors import linear_to_srgb
 from ..polygons import strip_triangles
 from ..rawmesh import RawMesh, demand_few, merge, transformed
 from .buffers import GltfFile, as_stored, buffer_view, parse_tree, read_accessor, read_buffers

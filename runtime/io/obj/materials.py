@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import MeshError
 from ...material import Material, Picture, seen_through
-from ..pictures import decode_image
+from ..pictures.pictures import decode_image
 from ..text import finite, lines_of, shown
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
-from ..colors import source_colors
+from ..pictures.colors import source_colors
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,8 +17,8 @@ from scipy.special import expit
 from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
 from ...mesh import Polygons
-from ..colors import as_rgba
-from ..pictures import decode_image
+from ..pictures.colors import as_rgba
+from ..pictures.pictures import decode_image
 from ..polygons import Triangles, strip_triangles, triangles_of
 from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..colors import source_colors
+from ..pictures.colors import source_colors
 from ..points.cloud import check_uv
 
 if TYPE_CHECKING:

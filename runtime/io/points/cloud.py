@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import InputError, ShapeError
 from ...geometry.rows import first_of_each
 from ..clean.weld import SMALLEST_DIAGONAL, weld_vertices
-from ..colors import as_rgba
+from ..pictures.colors import as_rgba
 from ..rawmesh import LARGEST_DIAGONAL, to_float64, unit_vectors
 
 if TYPE_CHECKING:

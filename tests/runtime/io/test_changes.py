@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import flexpara
-from flexpara.runtime.io.changes import UNSAID, WORDS, told
+from flexpara.runtime.io.asset.changes import UNSAID, WORDS, told
 
 
 def test_nothing_changed_is_nothing_said() -> None:

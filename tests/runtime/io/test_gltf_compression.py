@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import MeshError, MissingDependencyError
-from flexpara.runtime.io.changes import lost
+from flexpara.runtime.io.asset.changes import lost
 from flexpara.runtime.io.gltf.compression import decode_draco, decode_view
 from flexpara.runtime.io.gltf.scene import read_gltf
 from flexpara.runtime.io.meshfile import load_asset

@@ -11,7 +11,7 @@ import pytest
 from flexpara.runtime.errors import InputError, MeshError
 from flexpara.runtime.io.gltf.buffers import GltfFile
 from flexpara.runtime.io.gltf.materials import read_materials
-from flexpara.runtime.io.ktx2 import decode_ktx2
+from flexpara.runtime.io.pictures.ktx2 import decode_ktx2
 from flexpara.runtime.material import Material, refuse_unread
 from flexpara.runtime.mesh import Asset
 

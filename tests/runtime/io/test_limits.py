@@ -16,7 +16,7 @@ from flexpara.runtime.errors import InputError, MeshError
 from flexpara.runtime.io.gltf.scene import read_gltf
 from flexpara.runtime.io.limits import Limits, limits
 from flexpara.runtime.io.obj.read import read_obj
-from flexpara.runtime.io.pictures import decode_image
+from flexpara.runtime.io.pictures.pictures import decode_image
 from flexpara.runtime.io.points.tables import read_npz
 
 

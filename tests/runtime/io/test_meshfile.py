@@ -155,7 +155,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FLEXPARA_LIMITS", "bytes=10000")
-    monkeypatch.setattr("flexpara.runtime.io.others.mesh_loaders", {"3mf": None, "3dxml": dict})
+    monkeypatch.setattr("flexpara.runtime.io.formats.others.mesh_loaders", {"3mf": None, "3dxml": dict})
     with zipfile.ZipFile(tmp_path / "a.3dxml", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("big", b"\0" * 1_000_000)
     with pytest.raises(MeshError, match="unpacks to 1000000 bytes"):
@@ -165,7 +165,9 @@ def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypa
 def test_a_format_whose_reader_is_absent_names_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from trimesh.exceptions import ExceptionWrapper
 
-    monkeypatch.setattr("flexpara.runtime.io.others.mesh_loaders", {"dae": ExceptionWrapper(ImportError("collada"))})
+    monkeypatch.setattr(
+        "flexpara.runtime.io.formats.others.mesh_loaders", {"dae": ExceptionWrapper(ImportError("collada"))}
+    )
     (tmp_path / "a.dae").write_text("")
     with pytest.raises(MissingDependencyError, match="pip install"):
         load_asset(tmp_path / "a.dae")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from flexpara.runtime.io.asset.shading import shaded
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.io.obj.rewrite import rewrite_obj
-from flexpara.runtime.io.shading import shaded
 from flexpara.runtime.mesh import Asset, Atlas
 
 SOURCE = """# a plan

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.io.off import read_off
+from flexpara.runtime.io.formats.off import read_off
 from flexpara.runtime.io.rawmesh import RawMesh
 
 POINTS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError
+from flexpara.runtime.io.asset.pages import file_names, pages_of, part_of
 from flexpara.runtime.io.gltf.buffers import GltfFile
 from flexpara.runtime.io.gltf.document import Document, Part
 from flexpara.runtime.io.meshfile import asset_from_arrays
-from flexpara.runtime.io.pages import file_names, pages_of, part_of
 from flexpara.runtime.material import Material
 from flexpara.runtime.mesh import Asset
 

@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
-from flexpara.runtime.io.colors import linear_to_srgb
 from flexpara.runtime.io.obj.materials import read_mtl
-from flexpara.runtime.io.pictures import decode_image, read_in_folder
+from flexpara.runtime.io.pictures.colors import linear_to_srgb
+from flexpara.runtime.io.pictures.pictures import decode_image, read_in_folder
 
 
 def png(pixels: np.ndarray) -> bytes:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from flexpara.runtime.io.asset.shading import shaded
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
-from flexpara.runtime.io.shading import shaded
 from flexpara.runtime.mesh import Asset
 
 QUADS = "4 3 2 1,5 6 7 8,1 2 6 5,2 3 7 6,3 4 8 7,4 1 5 8"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexpara.runtime.errors import InputError
-from flexpara.runtime.io.stl import read_stl
+from flexpara.runtime.io.formats.stl import read_stl
 
 CORNERS = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=np.float32)
 

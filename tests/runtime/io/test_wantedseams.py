@@ -10,8 +10,8 @@ import pytest
 
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.io.asset.wantedseams import NO_WISH, WantedSeams, read_cuts, read_protected, wanted_seams
 from flexpara.runtime.io.meshfile import asset_from_arrays
-from flexpara.runtime.io.wantedseams import NO_WISH, WantedSeams, read_cuts, read_protected, wanted_seams
 from flexpara.runtime.mesh import Asset
 from flexpara.runtime.options.seams import SeamOptions
 from flexpara.runtime.samples import make_sample

@@ -13,7 +13,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from flexpara.export.builder import GraphBuilder, Header
+from flexpara.export.graph.builder import GraphBuilder, Header
 from flexpara.runtime.errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexpara.export.builder import Ends, GraphBuilder, Header
+from flexpara.export.graph.builder import Ends, GraphBuilder, Header
 from flexpara.runtime.errors import BundleError, InputError, MissingDependencyError, MissingFileError, ShapeError
 from flexpara.runtime.mesh import Frame
 from flexpara.runtime.sessions.bundle import METADATA_KEY, BundleMetadata

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from flexpara.export.metadata import PlacedCharts
-from flexpara.export.torchfile import export_onnx
+from flexpara.export.graph.metadata import PlacedCharts
+from flexpara.export.paper.torchfile import export_onnx
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.session import UnwrapSession
 from flexpara.train.paper.config import PaperNets

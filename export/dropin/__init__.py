@@ -1,0 +1,4 @@
+"""The interface of xatlas-python over flexpara's charts, imported as `flexpara.xatlas`.
+
+Public face: `xatlas.Atlas`, `xatlas.parametrize`, `plainarrays.export`.
+"""

@@ -1,0 +1,93 @@
+"""What reading and cleaning could not take as it was, in words: a line each for the user.
+
+Counts that tell a reader of the report something, but change nothing that the user would miss, stay unsaid: vertices
+that were welded or that no face uses, and how many parts there are.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...options.unwrap import POLYGONS, SCENES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ...mesh import Asset
+    from ...options.unwrap import Outputs
+
+UNSAID = frozenset({"welded_vertices", "unreferenced_vertices", "components"})
+WORDS = {
+    "coincident_faces": "{} lying on another kept, each side with uv of its own|face|faces",
+    "degenerate_faces": "{} without area left out|face|faces",
+    "draco_undone": "Draco's compression of {} undone; compress the result again|primitive|primitives",
+    "dropped_face_colors": "colours of {} left out, as the vertices have their own|face|faces",
+    "dropped_normals": "normals of {} left out, as other parts have none|vertex|vertices",
+    "faces_under_three_corners": "{} of under three corners left out|face|faces",
+    "faces_without_colors": "{} without colours made white|face|faces",
+    "faces_without_uv": "{} without uv in a mesh that has them|face|faces",
+    "flipped_faces": "{} turned to agree with the others around|face|faces",
+    "flat_islands": "{} without area in uv left in one point|island|islands",
+    "invalid_islands": "{} with triangles that overlap or are turned over, as in the file|island|islands",
+    "meshopt_undone": "meshopt's compression of {} undone; compress the result again|piece|pieces",
+    "missing_materials": "{} of materials not found beside the mesh|file|files",
+    "missing_textures": "{} not found or in a format that is not read|texture|textures",
+    "missing_uv_or_normals": "{} referring to uv or normals that the file does not hold|corner|corners",
+    "non_manifold_edges": "{} with three faces or more, cut there|edge|edges",
+    "points_without_normal": "{} without a normal in a cloud that has them|point|points",
+    "polygons_as_triangles": "{} of over three corners written as triangles|polygon|polygons",
+    "polygons_cut": "{} cut by seams or covered by no fan, written as triangles|polygon|polygons",
+    "repaired_normals": "{} of no length or not finite replaced|normal|normals",
+    "skipped_animations": "{} left out|animation|animations",
+    "skipped_cameras": "{} left out|camera|cameras",
+    "skipped_lights": "{} left out|light|lights",
+    "skipped_lines": "{} left out|line element|line elements",
+    "skipped_meshes": "{} not selected or without triangles left out|mesh|meshes",
+    "skipped_morph_targets": "{} left out|morph target|morph targets",
+    "skipped_names": "{} of objects, groups or smoothing left out|name|names",
+    "skipped_pictures": "{} of materials left out, as they lie on the old uv|picture|pictures",
+    "skipped_points": "{} left out|point element|point elements",
+    "skipped_primitives": "{} of points or lines left out|primitive|primitives",
+    "skipped_skins": "{} left out: the mesh stands as it was modelled|skin|skins",
+    "textures_not_decoded": "{} in a format that is not decoded, not baked|texture|textures",
+    "textures_of_other_uv": "{} on a second uv set not baked|texture|textures",
+    "trailing_bytes": "{} behind the last triangle left out|byte|bytes",
+    "uv_not_finite": "uv of {} not finite, set to 0|vertex|vertices",
+    "vertices_without_colors": "{} without colours made white|vertex|vertices",
+    "vertices_without_z": "{} of two numbers placed at z = 0|vertex|vertices",
+}
+
+
+def lost(asset: Asset, outputs: Outputs) -> dict[str, int]:
+    """What is in the file of a mesh and in nothing that will be written, name → count.
+
+    outputs: without "auto".
+    """
+    written, counts = set(outputs.formats), dict[str, int]()
+    if asset.document is not None and written.isdisjoint(SCENES):
+        counts |= asset.document.beyond_meshes()
+    if asset.document is not None and not written.isdisjoint(SCENES):
+        counts |= asset.document.compressed()
+    if asset.obj is not None and "obj" not in written:
+        counts |= asset.obj.beyond_meshes()
+    if asset.obj is not None and "obj" in written:
+        counts["skipped_pictures"] = asset.obj.pictures(outputs.maps)
+    if asset.polygons is not None and written.isdisjoint(POLYGONS):
+        counts["polygons_as_triangles"] = asset.polygons.large
+    return {name: count for name, count in counts.items() if count}
+
+
+def told(changes: Mapping[str, int]) -> list[str]:
+    """A line without a full stop for each change that a user would miss.
+
+    >>> told({"degenerate_faces": 1, "flipped_faces": 298, "components": 3})
+    ['1 face without area left out', '298 faces turned to agree with the others around']
+    """
+    return [_clause(name, count) for name, count in changes.items() if count and name not in UNSAID]
+
+
+def _clause(name: str, count: int) -> str:
+    if name not in WORDS:
+        return f"{name.replace('_', ' ')}: {count}"
+    form, one, many = WORDS[name].split("|")
+    return form.format(f"{count} {one if count == 1 else many}")

@@ -1,0 +1,112 @@
+"""Files beside a mesh file, and pictures: bytes → pixels.
+
+h w texels.  A mesh file may come from anyone: names in it reach no file outside its own folder, and no network.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from pathlib import PureWindowsPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from ...errors import MeshError
+from ..limits import TEXTURES, limits, raised
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+"""Kinds of pictures that are opened.  Pillow knows others, some of which start programs or are hardly used."""
+BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
+BROKEN += (zlib.error, Image.DecompressionBombError, MemoryError)
+"""What Pillow raises on damaged files: it has no family of its own."""
+
+
+def read_in_folder(folder: Path, name: str) -> bytes | None:
+    """Bytes of the file of this name inside the folder, or None where there is none.
+
+    OBJ files often name folders of their author's machine: those are looked for beside the mesh by base name.
+    """
+    base = PureWindowsPath(name.strip()).name
+    for candidate in (name.strip(), base):
+        path = inside(folder, candidate)
+        if path is not None:
+            return path.read_bytes()
+    return None
+
+
+def inside(folder: Path, name: str) -> Path | None:
+    """The file of this name if it lies in the folder or below it, else None; links that lead outside are not followed.
+
+    None too for a name that no file can have: it may hold any character.
+    """
+    try:
+        path = (folder / name).resolve()
+        return path if name and path.is_relative_to(folder.resolve()) and path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
+def decode_image(data: bytes, beside: Iterable[NDArray[np.uint8] | None] = ()) -> NDArray[np.uint8]:
+    """Picture file → (h, w, 4) uint8 sRGB, row 0 = top.  beside: pictures of the same file that are read already.
+
+    Raises: MeshError for bytes that are no picture, or more texels than are read.
+    """
+    try:
+        with _opened(data) as image:
+            demand_texels(image.width, image.height, beside)
+            limits().demand_unpacked(4 * image.width * image.height, len(data), "a texture")
+            return picture_pixels(image)
+    except MeshError:
+        raise
+    except BROKEN as error:
+        raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
+
+
+def _opened(data: bytes) -> Image.Image:
+    """A picture of which but the head is read.  Pillow's own limit on pixels stands aside: ours follows."""
+    theirs, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        return Image.open(io.BytesIO(data), formats=FORMATS)
+    finally:
+        Image.MAX_IMAGE_PIXELS = theirs
+
+
+def demand_texels(width: int, height: int, beside: Iterable[NDArray[np.uint8] | None] = ()) -> None:
+    """Raises: MeshError for a texture of more texels than the limits in force allow, alone or with those beside it."""
+    most = limits().texels
+    if width * height > most:
+        remedy = f"scale it down, or {raised('texels')}"
+        raise MeshError(f"a texture has {width} × {height} pixels, at most {most} are read; {remedy}")
+    together = width * height + sum(picture.shape[0] * picture.shape[1] for picture in beside if picture is not None)
+    if together > TEXTURES * most:
+        found = f"the textures of a file have more than {TEXTURES * most} pixels together, expected fewer"
+        raise MeshError(f"{found}; scale them down, or {raised('texels')}")
+
+
+def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
+    """Opened picture → (h, w, 4) uint8 sRGB, row 0 = top.
+
+    Raises: MeshError where it is damaged or has more texels than are read.
+    """
+    demand_texels(image.width, image.height)
+    try:
+        return np.asarray(image.convert("RGBA"), dtype=np.uint8)
+    except BROKEN as error:
+        raise MeshError("a texture is damaged, expected a whole PNG or JPEG; remove it or save it as PNG") from error
+
+
+def png_of(pixels: NDArray[np.uint8]) -> bytes:
+    """The bytes of a PNG file of (h, w, 4) uint8, without alpha where all of it is 255."""
+    stream = io.BytesIO()
+    opaque = bool((pixels[..., 3] == 255).all())
+    Image.fromarray(np.ascontiguousarray(pixels[..., :3] if opaque else pixels)).save(stream, "PNG")
+    return stream.getvalue()
