@@ -1,5 +1,6 @@
 """`flexpara.xatlas` beside xatlas, the same calls: `python -m benchmarks.dropin [MESH…] [--level-sets FACES…]`.
 
+With --kept TABLE.json a run that was ended goes on: lines that are in that file are not measured again.
 Each mesh goes through `add_mesh`, `generate` and `get_mesh` with default options, in a process for each tool.  A level
 set is what callers in 3D generation hand over: marching cubes over a labyrinth with noise, its vertices rounded as such
 pipelines do, so that edges are not manifold and crumbs float about.  Seconds are those of the calls; CPU seconds are
@@ -8,10 +9,13 @@ those of the process.  Seam is its length over √area; symdir the mean symmetri
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser
+from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,13 +23,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from benchmarks.corpus.processes import run
+from flexpara.runtime.files import replace_file
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.io.clean.clean import clean
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.io.rawmesh import RawMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -107,6 +112,24 @@ def row(tool: str, mesh: Mesh, budget: float, folder: Path) -> str:
     return f"{start} {seconds:.1f} ({ended.cpu_seconds:.0f}) | {measures} | {found['flipped_faces']} |"
 
 
+@dataclass(frozen=True)
+class Kept:
+    """Lines of the table that are known, in a file where there is one: {"what was run": "line"}."""
+
+    path: Path | None
+
+    def line(self, name: str, made: Callable[[], str]) -> str:
+        """The line of that name; measured, and kept at once, where it is not known."""
+        known: dict[str, str] = {}
+        if self.path is not None and self.path.is_file():
+            known = json.loads(self.path.read_text(encoding="utf-8"))
+        if name not in known:
+            known[name] = made()
+            if self.path is not None:
+                replace_file(self.path, json.dumps(known, indent=1, ensure_ascii=False).encode())
+        return known[name]
+
+
 def given_meshes(paths: Sequence[Path], level_sets: Sequence[int]) -> Iterator[Mesh]:
     """Files, then level sets of so many faces."""
     for path in paths:
@@ -121,6 +144,7 @@ def main() -> None:
     parser.add_argument("meshes", nargs="*", type=Path)
     parser.add_argument("--level-sets", nargs="*", type=int, default=[])
     parser.add_argument("--budget", type=float, default=60.0, help="seconds for flexpara.xatlas.settings.time_budget")
+    parser.add_argument("--kept", type=Path, help="a file that keeps each line as soon as it is known")
     for name in ("--run", "--given", "--answer"):
         parser.add_argument(name)
     asked = parser.parse_args()
@@ -128,10 +152,12 @@ def main() -> None:
         unwrapped(asked.run, asked.given, asked.answer, asked.budget)
         return
     print("| mesh | faces | tool | seconds (CPU) | charts | seam | symdir | flips |\n|---|---|---|---|---|---|---|---|")
+    kept = Kept(asked.kept)
     with tempfile.TemporaryDirectory() as folder:
         for mesh in given_meshes(asked.meshes, asked.level_sets):
             for tool in TOOLS:
-                print(row(tool, mesh, asked.budget, Path(folder)), flush=True)
+                name = f"{mesh.name} {len(mesh.faces)} {tool}" + f" {asked.budget:g} s" * (tool != "xatlas")
+                print(kept.line(name, partial(row, tool, mesh, asked.budget, Path(folder))), flush=True)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 BLOCKS = dict(BLOCK.findall((ROOT / "docs" / "tasks" / "onnx.md").read_text(encoding="utf-8")))
 MODULES = ROOT / "node_modules"
 HEADERS = ROOT / ".venv" / "include" / "onnxruntime"
-CARGO = '[package]\nname = "ask"\nversion = "0.1.0"\nedition = "2021"\n[dependencies]\nort = "2.0.0-rc.10"\n'
+CARGO = '[package]\nname = "ask"\nversion = "0.1.0"\nedition = "2021"\n[dependencies]\nort = "=2.0.0-rc.12"\n'
 WEB = pytest.mark.skipif(
     not (MODULES / "onnxruntime-web").is_dir(), reason="npm package onnxruntime-web is not installed: scripts/test"
 )

@@ -110,6 +110,16 @@ def write_cuts(ends: NDArray[np.float64], path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
+def fan_centres(mesh: Mesh) -> NDArray[np.float64]:
+    """(n, 3) centres of the triangles of each polygon's fans, whichever corner they begin at."""
+    found = [np.zeros((0, 3))]
+    for size in np.unique(mesh.size).tolist():
+        corners = mesh.positions[mesh.loop_vertex[mesh.start[mesh.size == size, None] + np.arange(size)]]
+        apex, first, second = corners[:, :, None], corners[:, None], np.roll(corners, -1, axis=1)[:, None]
+        found.append(((apex + first + second) / 3.0).reshape(-1, 3))
+    return np.concatenate(found)
+
+
 def read_answer(path: Path, mesh: Mesh) -> Answer:
     """The uv of each loop, out of an npz file that flexpara wrote of the mesh."""
     with np.load(path, allow_pickle=False) as found:

@@ -55,7 +55,10 @@ class Sidebar:
         column = self.layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         for name in settings.NAMES:
-            column.prop(asked, name)
+            if name == "protect" and context.object is not None:
+                column.prop_search(asked, name, context.object, "vertex_groups")
+            else:
+                column.prop(asked, name)
         for entry in operators.COMMANDS:
             settings.handed_over(asked, self.layout.operator(entry.bl_idname))
         measured = context.scene.get("flexpara")

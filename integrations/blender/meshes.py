@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 UV_NAME = "UVMap"
 CHARTS, DISTORTION, SEAMS = "flexpara charts", "flexpara distortion", "flexpara seams"
 """Attributes that the overlays show: of faces, of faces, of edges; the first two have colours besides."""
+PROTECTED = 0.5
+"""Weight in a vertex group from which a vertex is spared seams."""
 HEAT_TOP = 1.2
 """Distortion at which the colour is deepest."""
 
@@ -105,6 +107,17 @@ def marked_edges(entry: Chosen) -> NDArray[np.float64]:
     edges = np.unique(column(data.loops, "edge_index", np.int32)[entry.loops])
     marked = edges[column(data.edges, "use_seam", bool)[edges]]
     return entry.mesh.positions[column(data.edges, "vertices", np.int32, 2)[marked]]
+
+
+def protected_part(entry: Chosen, group: str) -> Mesh:
+    """The chosen polygons all of whose corners are in a vertex group, in the world."""
+    rows, found = entry.thing.data.vertices, entry.thing.vertex_groups.get(group)
+    if found is None:
+        return exchange.part_of(entry.mesh, np.zeros(len(entry.mesh.size), bool))
+    held = ((part.weight for part in row.groups if part.group == found.index) for row in rows)
+    inside = np.array([max(weights, default=0.0) >= PROTECTED for weights in held])
+    whole = np.minimum.reduceat(inside[entry.mesh.loop_vertex], entry.mesh.start)
+    return exchange.part_of(entry.mesh, whole)
 
 
 def show_seams(entry: Chosen) -> None:

@@ -8,13 +8,16 @@ import shlex
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
 
 from . import child, exchange, meshes
 from .settings import UnwrapSettings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 TICK = 0.1
 """Seconds between two looks at the process."""
@@ -143,8 +146,18 @@ class FLEXPARA_OT_unwrap(InProcess, UnwrapSettings, bpy.types.Operator):
         if self.keep_seams and len(kept):
             exchange.write_cuts(kept, folder / "cuts.txt")
             options += ["--cut", str(folder / "cuts.txt")]
+        if self.protect:
+            np.save(folder / "protected.npy", self.protected())
+            options += ["--protect", str(folder / "protected.npy")]
         fixed = ["--format", "npz", "--maps", "none", "--progress-lines"]
         return ["unwrap", str(folder / "mesh.ply"), "-o", str(folder / "out"), *fixed, *options]
+
+    def protected(self) -> NDArray[np.float64]:
+        """(n, 3) points of the faces in the vertex group.  Raises: child.FlexparaError where nothing is."""
+        part = exchange.joined([meshes.protected_part(entry, self.protect) for entry in self.chosen])
+        if not len(part.size):
+            raise child.FlexparaError(f"no face lies in the vertex group {self.protect!r}: fill it, or empty Protect")
+        return exchange.fan_centres(part)
 
     def take(self, folder: Path, said: str) -> None:
         del said

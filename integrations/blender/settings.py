@@ -34,6 +34,9 @@ class UnwrapSettings:
     keep_seams: bpy.props.BoolProperty(
         name="Keep Seams", default=False, description="Edges marked as seams before stay seams; new ones are added"
     )
+    protect: bpy.props.StringProperty(
+        name="Protect", description="Vertex group whose faces seams keep away from, at ten times the price"
+    )
     mark_seams: bpy.props.BoolProperty(name="Mark Seams", default=True, description="Seams become Blender's seams")
 
 

@@ -17,7 +17,14 @@ class Layout:
 
     def prop(self, owner: Any, name: str) -> None:
         """A field."""
-        self.lines.append(f"{owner.bl_rna.properties[name].name}: {getattr(owner, name):g}")
+        value = getattr(owner, name)
+        shown = value if isinstance(value, str) else f"{value:g}"
+        self.lines.append(f"{owner.bl_rna.properties[name].name}: {shown}")
+
+    def prop_search(self, owner: Any, name: str, source: Any, names: str) -> None:
+        """A field for one of the names that something has."""
+        assert hasattr(source, names)
+        self.prop(owner, name)
 
     def operator(self, name: str, text: str = "") -> Any:
         """A button."""

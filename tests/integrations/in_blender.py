@@ -16,104 +16,31 @@ from typing import Any
 import numpy as np
 
 bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
-window: Any = importlib.import_module("blender_window")  # beside this script
-
-
-def enabled(folder: Path, program: str) -> Any:
-    """Enable the extension by its folder, as a package of the name that its folder has."""
-    sys.path.insert(0, str(folder.parent))
-    extension = importlib.import_module(folder.name)
-    extension.register()
-    extension.child.find = lambda preferred="": program or preferred
-    return extension
-
-
-def empty() -> None:
-    """A scene without anything."""
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
-
-
-def picked(*things: Any) -> None:
-    """Select these, the last one active."""
-    bpy.ops.object.select_all(action="DESELECT")
-    for thing in things:
-        thing.select_set(True)
-    bpy.context.view_layer.objects.active = things[-1]
-
-
-def select_faces(thing: Any, *numbers: int) -> None:
-    """Go into edit mode with these faces selected, and no other."""
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
-    bpy.ops.mesh.select_all(action="DESELECT")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for number in numbers:
-        thing.data.polygons[number].select = True
-    bpy.ops.object.mode_set(mode="EDIT")
-
-
-def uv_of(thing: Any) -> np.ndarray:
-    """(l, 2) float64 of the active layer."""
-    values = np.zeros(2 * len(thing.data.loops), np.float32)
-    thing.data.uv_layers.active.uv.foreach_get("vector", values)
-    return values.reshape(-1, 2).astype(np.float64)
-
-
-def signed_area(uv: np.ndarray) -> float:
-    x, y = uv.T
-    return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-
-
-def areas(thing: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Of each polygon: area in the world, signed area in uv."""
-    uv, scale = uv_of(thing), thing.matrix_world.to_scale()
-    assert len(set(np.round(scale, 6))) == 1
-    space = np.array([face.area for face in thing.data.polygons]) * scale[0] ** 2
-    return space, np.array([signed_area(uv[list(face.loop_indices)]) for face in thing.data.polygons])
-
-
-def seams_are_where_uv_part(thing: Any) -> bool:
-    """Blender's seams are the edges at which the uv of two polygons differ."""
-    uv, ends = uv_of(thing), dict[int, set[tuple[float, ...]]]()
-    for face in thing.data.polygons:
-        loops = list(face.loop_indices)
-        for loop, after in zip(loops, loops[1:] + loops[:1], strict=True):
-            entry = thing.data.loops
-            pair = sorted([(entry[loop].vertex_index, *uv[loop]), (entry[after].vertex_index, *uv[after])])
-            ends.setdefault(entry[loop].edge_index, set()).add(tuple(number for row in pair for number in row))
-    return all(thing.data.edges[edge].use_seam == (len(pairs) > 1) for edge, pairs in ends.items())
-
-
-def same_density(*things: Any) -> bool:
-    """All polygons are the right way up, and have nearly as much uv for each unit."""
-    pairs = [areas(thing) for thing in things]
-    space, flat = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    share = flat / space * space.sum() / flat.sum()
-    return bool((flat > 0.0).all() and np.quantile(share, 0.05) > 0.6 and np.quantile(share, 0.95) < 1.6)
+things: Any = importlib.import_module("blender_things")  # beside this script
+window: Any = importlib.import_module("blender_window")
 
 
 def cube() -> None:
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add()
     thing = bpy.context.object
     assert bpy.ops.flexpara.unwrap(size=256, padding=2) == {"FINISHED"}
-    space, flat = areas(thing)
+    space, flat = things.areas(thing)
     np.testing.assert_allclose(flat / space, (flat / space).mean(), rtol=1e-4)
     assert flat.min() > 0.0
-    assert uv_of(thing).min() >= 0.0
-    assert uv_of(thing).max() <= 1.0
-    assert seams_are_where_uv_part(thing)
+    assert things.uv_of(thing).min() >= 0.0
+    assert things.uv_of(thing).max() <= 1.0
+    assert things.seams_are_where_uv_part(thing)
     assert [len(face.vertices) for face in thing.data.polygons] == [4] * 6
 
 
 def suzanne() -> dict[str, float]:
     """With an n-gon; beside Blender's own ways."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_monkey_add()
     thing = bpy.context.object
     thing.data.uv_layers.remove(thing.data.uv_layers.active)
-    select_faces(thing, 0, 2, 4, 6)
+    things.select_faces(thing, 0, 2, 4, 6)
     bpy.ops.mesh.dissolve_faces()
     start = time.perf_counter()
     assert bpy.ops.flexpara.unwrap(size=512) == {"FINISHED"}
@@ -121,8 +48,8 @@ def suzanne() -> dict[str, float]:
     assert bpy.context.mode == "EDIT_MESH"
     bpy.ops.object.mode_set(mode="OBJECT")
     assert max(len(face.vertices) for face in thing.data.polygons) > 4
-    assert seams_are_where_uv_part(thing)
-    assert same_density(thing)
+    assert things.seams_are_where_uv_part(thing)
+    assert things.same_density(thing)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     seconds |= peers()
@@ -145,15 +72,15 @@ def peers() -> dict[str, float]:
 
 def modifiers() -> None:
     """The base mesh is unwrapped; what modifiers make of it has uv, too."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cylinder_add(vertices=12)
     thing = bpy.context.object
     thing.modifiers.new("smooth", "SUBSURF")
     thing.modifiers.new("twice", "ARRAY")
     assert bpy.ops.flexpara.unwrap(size=256, padding=2) == {"FINISHED"}
     assert sorted({len(face.vertices) for face in thing.data.polygons}) == [4, 12]
-    assert seams_are_where_uv_part(thing)
-    assert same_density(thing)
+    assert things.seams_are_where_uv_part(thing)
+    assert things.same_density(thing)
     evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     assert len(evaluated.polygons) > 2 * len(thing.data.polygons)
     assert evaluated.uv_layers.active is not None
@@ -161,41 +88,41 @@ def modifiers() -> None:
 
 def several() -> None:
     """Two objects of other scales share one atlas, at one density in the world; a third is left alone."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add(location=(4, 0, 0))
     alone = bpy.context.object
-    before = uv_of(alone)
+    before = things.uv_of(alone)
     bpy.ops.mesh.primitive_cube_add()
     first = bpy.context.object
     bpy.ops.mesh.primitive_cube_add(size=2, scale=(3, 3, 3))
     second = bpy.context.object
-    picked(first, second)
+    things.picked(first, second)
     assert bpy.ops.flexpara.unwrap(size=512, padding=2) == {"FINISHED"}
-    assert same_density(first, second)
-    np.testing.assert_array_equal(uv_of(alone), before)
-    everything = np.concatenate([uv_of(first), uv_of(second)])
+    assert things.same_density(first, second)
+    np.testing.assert_array_equal(things.uv_of(alone), before)
+    everything = np.concatenate([things.uv_of(first), things.uv_of(second)])
     assert everything.min() >= 0.0
     assert everything.max() <= 1.0
     assert bpy.ops.flexpara.repack(size=256, padding=1) == {"FINISHED"}
-    assert same_density(first, second)
+    assert things.same_density(first, second)
 
 
 def selected_faces() -> None:
     """Other faces keep their uv."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add()
     thing = bpy.context.object
-    before = uv_of(thing)
-    select_faces(thing, 1, 2)
+    before = things.uv_of(thing)
+    things.select_faces(thing, 1, 2)
     assert bpy.ops.flexpara.unwrap(size=256, padding=2, selected_only=True) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
-    changed = (np.abs(uv_of(thing) - before).max(axis=1) > 0.0).reshape(6, 4).any(axis=1)
+    changed = (np.abs(things.uv_of(thing) - before).max(axis=1) > 0.0).reshape(6, 4).any(axis=1)
     assert changed.tolist() == [False, True, True, False, False, False]
 
 
 def kept_seams() -> None:
     """A ring marked around a torus, where no seam would pay, stays one."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_torus_add(major_segments=24, minor_segments=12)
     thing = bpy.context.object
     corners = np.array([vertex.co for vertex in thing.data.vertices])
@@ -206,12 +133,82 @@ def kept_seams() -> None:
         thing.data.edges[edge].use_seam = True
     assert bpy.ops.flexpara.unwrap(size=256, padding=2, keep_seams=True) == {"FINISHED"}
     assert all(thing.data.edges[edge].use_seam for edge in marked)
-    assert seams_are_where_uv_part(thing)
+    assert things.seams_are_where_uv_part(thing)
+
+
+def protected_faces() -> None:
+    """The faces around what was a seam are no longer crossed by one, once they are in a vertex group."""
+    things.empty()
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16)
+    thing = bpy.context.object
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2) == {"FINISHED"}
+    corners = np.array([vertex.co for vertex in thing.data.vertices])
+    first = corners[list(thing.data.edges[min(things.seams_of(thing))].vertices)].mean(axis=0)
+    near = np.flatnonzero(np.linalg.norm(corners - first, axis=1) < 0.6)
+    thing.vertex_groups.new(name="face").add(near.tolist(), 1.0, "REPLACE")
+    ring = np.flatnonzero(np.linalg.norm(corners - first, axis=1) < 0.4)
+    inside = {edge.index for edge in thing.data.edges if set(edge.vertices) <= set(ring.tolist())}
+    assert things.seams_of(thing) & inside
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2, protect="face") == {"FINISHED"}
+    assert not things.seams_of(thing) & inside
+    said = things.refused(lambda: bpy.ops.flexpara.unwrap(size=256, padding=2, protect="nose"))
+    assert "no face lies in the vertex group 'nose'" in said
+
+
+def undo() -> None:
+    """One step takes back uv and seams, of an object and of what is edited; so for repacking."""
+    things.empty()
+    bpy.ops.mesh.primitive_cube_add()
+    thing = bpy.context.object
+    name, before = thing.name, things.uv_of(thing)
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.flexpara.unwrap("EXEC_DEFAULT", True, size=256, padding=2) == {"FINISHED"}
+    after = things.uv_of(thing)
+    assert bpy.ops.flexpara.repack("EXEC_DEFAULT", True, size=256, padding=30) == {"FINISHED"}
+    assert np.abs(things.uv_of(thing) - after).max() > 0.01
+    thing = things.undone(name)
+    np.testing.assert_array_equal(things.uv_of(thing), after)
+    assert things.seams_of(thing)
+    thing = things.undone(name)
+    np.testing.assert_array_equal(things.uv_of(thing), before)
+    assert not things.seams_of(thing)
+    things.select_faces(thing, 1, 2)
+    bpy.ops.ed.undo_push(message="edited")
+    assert bpy.ops.flexpara.unwrap("EXEC_DEFAULT", True, size=256, padding=2, selected_only=True) == {"FINISHED"}
+    thing = things.undone(name)
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    np.testing.assert_array_equal(things.uv_of(thing), before)
+
+
+def several_edited() -> None:
+    """Selected faces of two objects in edit mode share the square; what is not selected stays."""
+    things.empty()
+    made = []
+    for place in (0.0, 4.0):
+        bpy.ops.mesh.primitive_cube_add(location=(place, 0, 0))
+        made.append(bpy.context.object)
+    before = things.uv_of(made[0])
+    things.picked(*made)
+    things.select_faces(made[1], 1, 2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for thing in made:
+        for face in thing.data.polygons:
+            face.select = face.index in (1, 2)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.flexpara.unwrap(size=256, padding=2, selected_only=True) == {"FINISHED"}
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    new = [things.uv_of(thing).reshape(6, 4, 2)[1:3] for thing in made]
+    for thing in made:
+        np.testing.assert_array_equal(things.uv_of(thing)[12:], before[12:])
+    centres = np.concatenate(new).mean(axis=1)
+    assert min(np.linalg.norm(centres[i] - centres[j]) for i in range(4) for j in range(i)) > 0.1
 
 
 def evaluate_and_bake() -> None:
     """Charts and distortion become attributes, numbers are kept, maps become packed pictures."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add()
     thing = bpy.context.object
     assert bpy.ops.flexpara.evaluate() == {"FINISHED"}
@@ -227,7 +224,7 @@ def evaluate_and_bake() -> None:
 
 def overlays() -> None:
     """Two charts of a cube, one of them stretched: colours, numbers and seams say which."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add()
     thing = bpy.context.object
     layer, top = thing.data.uv_layers.active, max(thing.data.polygons, key=lambda face: face.center.z).index
@@ -265,12 +262,12 @@ def sidebar(extension: Any) -> list[str]:
 
 def in_background(operators: Any) -> None:
     """A bar follows the stages; Esc once asks for the best so far, which is taken over."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_torus_add(major_segments=96, minor_segments=48)
-    picked(bpy.context.object)
+    things.picked(bpy.context.object)
     kind = operators.FLEXPARA_OT_unwrap
     settings = {"charts": 8, "max_stretch": 0.0, "time_budget": 0.0, "size": 256, "padding": 2, "seed": 0}
-    settings |= {"selected_only": False, "keep_seams": False, "mark_seams": True}
+    settings |= {"selected_only": False, "keep_seams": False, "protect": "", "mark_seams": True}
     methods = {name: getattr(kind, name) for name in ("words", "take", "with_uv")}
     told: list[Any] = []
     command, shown = type("Unwrap", (operators.InProcess,), methods | settings)(), window.Window()
@@ -288,32 +285,28 @@ def in_background(operators: Any) -> None:
     assert len(set(shown.shares)) > 2
     assert shown.shares[1:] == sorted(shown.shares[1:])
     assert told[-1][0] == {"INFO"}
-    assert np.ptp(uv_of(bpy.context.object), axis=0).min() > 0.3
+    assert np.ptp(things.uv_of(bpy.context.object), axis=0).min() > 0.3
 
 
 def failures() -> None:
     """What flexpara complains of is Blender's error, and nothing is changed."""
-    empty()
+    things.empty()
     bpy.ops.mesh.primitive_cube_add()
     thing = bpy.context.object
-    before = uv_of(thing)
-    refused = ""
-    try:
-        bpy.ops.flexpara.unwrap(size=16, padding=8)
-    except RuntimeError as error:
-        refused = str(error)
-    assert "padding is 8 texels" in refused
-    np.testing.assert_array_equal(uv_of(thing), before)
+    before = things.uv_of(thing)
+    assert "padding is 8 texels" in things.refused(lambda: bpy.ops.flexpara.unwrap(size=16, padding=8))
+    np.testing.assert_array_equal(things.uv_of(thing), before)
 
 
 def main(folder: str, program: str) -> None:
     """All checks."""
-    extension = enabled(Path(folder), program)
+    extension = things.enabled(Path(folder), program)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     cube()
     seconds = suzanne()
-    for check in (modifiers, several, selected_faces, kept_seams, evaluate_and_bake):
+    for check in (modifiers, several, several_edited, selected_faces, kept_seams, protected_faces, undo):
         check()
+    evaluate_and_bake()
     overlays()
     lines = sidebar(extension)
     in_background(extension.operators)

@@ -126,6 +126,16 @@ def test_cuts_are_written_as_they_are_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.loadtxt(tmp_path / "cuts.txt").reshape(-1, 2, 3), ends)
 
 
+def test_centres_of_fans_hold_those_of_each_triangle_that_a_polygon_may_be_cut_into(house: Any) -> None:
+    square = exchange.part_of(house, np.array([True, False]))
+    expected = {(2 / 3, 1 / 3), (1 / 3, 2 / 3), (1 / 3, 1 / 3), (2 / 3, 2 / 3)}
+    found = exchange.fan_centres(square)
+    assert {tuple(row) for row in np.round(found[:, :2], 9)} >= {tuple(np.round(row, 9)) for row in expected}
+    nothing = exchange.part_of(house, np.zeros(2, bool))
+    assert exchange.fan_centres(nothing).shape == (0, 3)
+    assert len(exchange.fan_centres(house)) == 16 + 25
+
+
 def test_a_process_is_watched_asked_and_its_error_is_told() -> None:
     talk = "import sys; print('flexpara: progress: charts 3/4', file=sys.stderr); print('done')"
     run = child.Run(sys.executable, ["-c", talk])
