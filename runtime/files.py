@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 PRODUCER = "flexpara"
 STAGING = ".flexpara-"
 """Beginning of the names of hidden folders."""
+LARGEST_REPORT = 64 << 20
+"""Bytes beyond which a JSON file is no report."""
 JOURNAL = ".flexpara.json"
 """Ending of the name of a hidden file that lists what is being moved."""
 
@@ -289,8 +291,15 @@ def _owned(folder: Path, stem: str) -> frozenset[str]:
     return frozenset(names)
 
 
+def results_in(folder: Path) -> frozenset[str]:
+    """Names of files that reports in the same folder list: what flexpara wrote there."""
+    return frozenset(name for path in folder.glob("*.json") if path.is_file() for name in _listed(path))
+
+
 def _listed(path: Path) -> set[str]:
     try:
+        if path.stat().st_size > LARGEST_REPORT:
+            return set()
         report = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError, RecursionError):
         return set()

@@ -101,14 +101,15 @@ def draw(
             _draw_lines(context, stack, camera, lines, pixels)
             context.enable_only(moderngl.NOTHING)
             picture = _resolve(context, stack, target, side)
-    blocks = picture.reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 4)
-    return np.ascontiguousarray(blocks.mean(axis=(1, 3))[..., :3])
+    blocks = picture[..., :3].reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 3)
+    corners = [blocks[:, row, :, column] for row, column in np.ndindex(SUPERSAMPLING, SUPERSAMPLING)]
+    return np.sum(corners, axis=0) / np.float32(len(corners))
 
 
 def _smooth_target(context: moderngl.Context, stack: ExitStack, side: int) -> moderngl.Framebuffer:
     """Multisampled float framebuffer with depth.  The caller releases it, its attachments go with the stack."""
     samples = min(SAMPLES, context.max_samples)
-    color = context.renderbuffer((side, side), 4, samples=samples, dtype="f4")
+    color = context.renderbuffer((side, side), 4, samples=samples, dtype="f2")
     stack.callback(color.release)
     depth = context.depth_renderbuffer((side, side), samples=samples)
     stack.callback(depth.release)
@@ -119,7 +120,7 @@ def _resolve(
     context: moderngl.Context, stack: ExitStack, source: moderngl.Framebuffer, side: int
 ) -> NDArray[np.float32]:
     """(side, side, 4) float32: the mean of the samples of each pixel."""
-    flat = context.renderbuffer((side, side), 4, dtype="f4")
+    flat = context.renderbuffer((side, side), 4, dtype="f2")
     stack.callback(flat.release)
     target = context.framebuffer(color_attachments=[flat])
     picture = np.zeros((side, side, 4), np.float32)
@@ -140,7 +141,6 @@ def three_quarter_axes() -> NDArray[np.float64]:
 def _draw_shape(context: moderngl.Context, stack: ExitStack, camera: Camera, shape: Shape) -> None:
     """All triangles in one call, positions about the camera's centre so that float32 keeps its digits."""
     program = build_program(context, ("shape.vert",), ("shape.frag",))
-    stack.callback(program.release)
     right, up, toward = camera.axes
     lamp = -0.45 * right + 0.65 * up + 0.75 * toward
     _set_view(program, camera)
@@ -162,7 +162,6 @@ def _draw_lines(context: moderngl.Context, stack: ExitStack, camera: Camera, lin
     if len(lines.segments) == 0:
         return
     program = build_program(context, ("line.vert",), ("line.frag",))
-    stack.callback(program.release)
     _set_view(program, camera)
     program["half_width"], program["lift"] = lines.width / pixels, LIFT
     program["color"] = lines.color

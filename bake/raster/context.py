@@ -3,11 +3,17 @@
 On Linux the context comes from EGL, so neither a display nor a window is needed: every EGL device is tried in turn and
 hardware is preferred; Mesa's llvmpipe (a CPU rasterizer) is taken where there is none.  Elsewhere the platform's own
 off-screen context is used.  OpenGL 3.3 core is all the shaders ask for.
+
+A context is kept for the next that asks, with its compiled shaders: a device leaks some kilobytes with each context,
+and compiling takes longer than most drawings.
 """
 
 from __future__ import annotations
 
+import atexit
+import os
 import sys
+import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -47,19 +53,46 @@ class ContextInfo:
     hardware: bool
 
 
+class Idle(threading.local):
+    """Contexts of this thread that nobody uses now: a context belongs to the thread that drew with it last."""
+
+    def __init__(self) -> None:
+        self.contexts: list[moderngl.Context] = []
+
+
+idle = Idle()
+
+
+def release_idle() -> None:
+    """Give back what the contexts of this thread that nobody uses hold."""
+    while idle.contexts:
+        idle.contexts.pop().release()
+
+
+atexit.register(release_idle)
+if hasattr(os, "register_at_fork"):  # a copied process can't draw with its parent's contexts, nor release them
+    os.register_at_fork(after_in_child=lambda: idle.contexts.clear())
+
+
 @contextmanager
 def open_context() -> Iterator[moderngl.Context]:
-    """A standalone OpenGL 3.3 context, current while the block runs, released at its end.
+    """A standalone OpenGL 3.3 context, current while the block runs; a new one where none is idle.
 
-    What is made in it is released by who makes it.
+    What is made in it is released by who makes it, but for programs (`shaders`).  It is kept at the end, unless the
+    block failed or OpenGL reports an error: then it is released.
 
     Raises: MissingDependencyError with every attempt's own words and the packages that mend it.
     """
-    context = _create()
+    context, sound = idle.contexts.pop() if idle.contexts else _create(), False
     try:
-        yield context
+        with context:
+            yield context
+            sound = context.error == "GL_NO_ERROR"
     finally:
-        context.release()
+        if sound:
+            idle.contexts.append(context)
+        else:
+            context.release()
 
 
 @contextmanager

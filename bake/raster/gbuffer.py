@@ -175,9 +175,8 @@ class DeviceRasterizer:
         self._corners = _corner_texture(context, stack, atlas, layout)
         self._targets = _targets(context, stack, self._width, self._height)
         self._blank = build_program(context, ("blank.vert",), ("blank.frag",))
-        stack.callback(self._blank.release)
-        self._interior = _program(context, stack, "interior")
-        self._border = _program(context, stack, "border")
+        self._interior = _program(context, "interior")
+        self._border = _program(context, "border")
         self._interior["growth"] = GROWTH
         self._border["reach"] = REACH
 
@@ -283,11 +282,10 @@ def _targets(context: moderngl.Context, stack: ExitStack, width: int, height: in
     return targets
 
 
-def _program(context: moderngl.Context, stack: ExitStack, name: str) -> moderngl.Program:
+def _program(context: moderngl.Context, name: str) -> moderngl.Program:
     """The program of interior or border."""
     vertex, fragment = ("exact", "triangle", f"{name}.vert"), ("exact", "surface", f"{name}.frag")
     program = build_program(context, vertex, fragment)
-    stack.callback(program.release)
     program["corners"] = 0
     return program
 

@@ -22,5 +22,13 @@ def shader_source(*names: str) -> str:
 
 
 def build_program(context: moderngl.Context, vertex: tuple[str, ...], fragment: tuple[str, ...]) -> moderngl.Program:
-    """A linked program; the caller releases it.  vertex, fragment: file names as in `shader_source`."""
-    return context.program(vertex_shader=shader_source(*vertex), fragment_shader=shader_source(*fragment))
+    """A linked program, made once for a context, which keeps it.  vertex, fragment: file names as in `shader_source`.
+
+    Its uniforms have the values that its last user gave them.
+    """
+    context.extra = context.extra or {}
+    programs: dict[object, moderngl.Program] = context.extra
+    if (vertex, fragment) not in programs:
+        made = context.program(vertex_shader=shader_source(*vertex), fragment_shader=shader_source(*fragment))
+        programs[vertex, fragment] = made
+    return programs[vertex, fragment]

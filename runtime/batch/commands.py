@@ -74,7 +74,7 @@ def work_off(
 
     first, count = batch.share
     mark = f"-{first}-of-{count}" if count > 1 else ""
-    jobs = shard(find_jobs(assets, output, options, outputs), batch.share)
+    jobs = shard(find_jobs(assets, output, options, outputs, console.note), batch.share)
     manifest = output / f"manifest{mark}.jsonl"
     if batch.dry_run:
         left = left_to_do(jobs, read_entries(manifest), __version__, retry=batch.retry_failed)

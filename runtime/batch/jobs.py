@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, MissingFileError
+from ..files import results_in
 from ..inputs import ENDINGS
 from ..options.keywords import from_keywords
 from ..options.unwrap import Options, Outputs
@@ -46,8 +48,16 @@ class Job:
             return ""
 
 
-def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: Outputs) -> list[Job]:
+Noted = Callable[[str], object]
+
+
+def find_jobs(
+    assets: Iterable[Path], output: Path, options: Options, outputs: Outputs, note: Noted = lambda _line: None
+) -> list[Job]:
     """The assets of folders (and those in them), lists and single files, in the order of their names.
+
+    Results of flexpara in the folders that are searched are no assets: those in the output folder, and those that a
+    report beside them lists.
 
     Args:
         assets: folders, meshes, or .jsonl lists of a JSON object a line: {"file": …, "options": {…}}, files relative to
@@ -55,14 +65,16 @@ def find_jobs(assets: Iterable[Path], output: Path, options: Options, outputs: O
         output: the folder for all; each asset gets one of its own in it.
         options: of each, where a list says nothing else.
         outputs: likewise.
+        note: called with a line where results were passed over.
 
     Raises: MissingFileError for what is not there or holds no mesh; InputError for a damaged list.
     """
     found: dict[Path, tuple[str, Options, Outputs]] = {}
     for path in assets:
-        found |= _listed(path, options, outputs) if path.suffix in LISTS else _found(path, options, outputs)
-    # results of an earlier run, where they lie in the folder that is searched
-    found = {path: entry for path, entry in found.items() if output.absolute() not in path.parents}
+        if path.suffix in LISTS:
+            found |= _listed(path, options, outputs)
+        else:
+            found |= {mesh: (name, options, outputs) for mesh, name in _found(path, output.absolute(), note).items()}
     found = {path: (printable(entry[0]), entry[1], entry[2]) for path, entry in found.items()}
     stems = Counter(str(Path(name).with_suffix("")) for name, _, _ in found.values())
     jobs = []
@@ -78,15 +90,23 @@ def printable(name: str) -> str:
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in name)
 
 
-def _found(path: Path, options: Options, outputs: Outputs) -> dict[Path, tuple[str, Options, Outputs]]:
+def _found(path: Path, output: Path, note: Noted) -> dict[Path, str]:
+    """The meshes of a folder, or a single one, each with its name below the batch."""
     if not path.exists():
         raise MissingFileError(f"{path} is not there, expected a folder, a mesh or a .jsonl list; correct the path")
     if path.is_file():
-        return {path.absolute(): (path.name, options, outputs)}
-    files = sorted(file for file in path.rglob("*") if file.suffix.lower() in ENDINGS and file.is_file())
-    if not files:
-        raise MissingFileError(f"{path} holds no mesh, expected files such as {', '.join(ENDINGS)}; name a folder")
-    return {file.absolute(): (file.relative_to(path).as_posix(), options, outputs) for file in files}
+        return {path.absolute(): path.name}
+    files = [file for file in path.rglob("*") if file.suffix.lower() in ENDINGS and file.is_file()]
+    files = sorted(file for file in files if output not in file.absolute().parents)
+    results = {folder: results_in(folder) for folder in {file.parent for file in files}}
+    sources = [file for file in files if file.name not in results[file.parent]]
+    if len(sources) < len(files):
+        count = len(files) - len(sources)
+        note(f"{path}: {count} meshes are results of flexpara by the reports beside them, and passed over")
+    if not sources:
+        found = "no mesh but results of flexpara" if files else "no mesh"
+        raise MissingFileError(f"{path} holds {found}, expected files such as {', '.join(ENDINGS)}; name a folder")
+    return {file.absolute(): file.relative_to(path).as_posix() for file in sources}
 
 
 def _listed(path: Path, options: Options, outputs: Outputs) -> dict[Path, tuple[str, Options, Outputs]]:

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
@@ -23,6 +23,8 @@ from ..files import sweep
 from ..runfile import facts_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from .jobs import Job
 
     Facts = dict[str, Any]
@@ -68,13 +70,14 @@ class Worker:
         cores = ",".join(map(str, self.cores))
         words = [sys.executable, "-m", f"{__package__}.worker", str(os.getpid()), self.work, cores]
         threads = dict.fromkeys((*LIBRARIES, LIMIT), str(max(len(self.cores), 1)))
-        return subprocess.Popen(
-            words,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, **threads},
-            start_new_session=True,
-        )
+        with no_interrupts():
+            return subprocess.Popen(
+                words,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env={**os.environ, **threads},
+                start_new_session=True,
+            )
 
     def begin(self, job: Job) -> None:
         """Give it a job; what a killed one left in its folder goes first."""
@@ -159,6 +162,19 @@ class Worker:
                     pipe.close()
         if self.job is not None:
             sweep(self.job.run.output)
+
+
+@contextmanager
+def no_interrupts() -> Iterator[None]:
+    """Processes started within this take no interrupt until they allow it: one would end them as they begin."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def wait_for(workers: list[Worker], seconds: float) -> list[Worker]:

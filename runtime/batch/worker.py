@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiskFullError, FlexparaError
+from ..heap import give_freed_memory_back, keep_freed_memory
 from ..runfile import Run, run_of
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 WATCH = 0.2
 """Seconds between two looks at the parent."""
+LARGE = 1 << 30
+"""Bytes that it may hold between two assets before it gives back what is free."""
 METRICS = ("charts", "symmetric_dirichlet_mean", "seam_length", "packing_efficiency", "flipped_faces")
 NETWORK = ("rms_texels", "chart_agreement")
 
@@ -39,6 +42,9 @@ def main(parent: str, work: str, cores: str) -> None:
     if cores and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core) for core in cores.split(",")})
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # but while charts are searched, when it asks for what there is
+    if hasattr(signal, "pthread_sigmask"):  # they were held back so far
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    keep_freed_memory()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
@@ -49,6 +55,8 @@ def main(parent: str, work: str, cores: str) -> None:
     for line in sys.stdin:
         answers.write(json.dumps(answer(function, run_of(json.loads(line))), allow_nan=False) + "\n")
         answers.flush()
+        if resident() > LARGE:  # it counts against the next asset
+            give_freed_memory_back()
 
 
 def _end_with(parent: int) -> None:
@@ -107,11 +115,20 @@ def reset_peak() -> None:
 
 def peak() -> int:
     """Peak of this process's memory, in bytes; 0 where the system does not say."""
+    return _told("VmHWM")
+
+
+def resident() -> int:
+    """Bytes that this process holds now; 0 where the system does not say."""
+    return _told("VmRSS")
+
+
+def _told(name: str) -> int:
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     except OSError:
         return 0
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), 0)
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith(name)), 0)
 
 
 if __name__ == "__main__":

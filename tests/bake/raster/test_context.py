@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,7 @@ import moderngl
 import pytest
 
 from flexpara.bake.raster import context as module
+from flexpara.bake.raster.shaders import build_program
 from flexpara.runtime.errors import FlexparaError, MissingDependencyError
 
 
@@ -18,10 +20,22 @@ class FakeContext:
 
     def __init__(self, renderer: str) -> None:
         self.info = {"GL_RENDERER": renderer}
-        self.released = False
+        self.released, self.error = False, "GL_NO_ERROR"
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None: ...
 
     def release(self) -> None:
         self.released = True
+
+
+@pytest.fixture(autouse=True)
+def none_idle() -> Iterator[None]:
+    """Before and after."""
+    module.release_idle()
+    yield
+    module.release_idle()
 
 
 def devices(monkeypatch: pytest.MonkeyPatch, answers: list[FakeContext | str]) -> None:
@@ -53,7 +67,7 @@ def test_hardware_is_preferred_to_an_earlier_software_device(monkeypatch: pytest
     with module.open_context() as context:
         assert context is hardware
     assert software.released
-    assert hardware.released
+    assert not hardware.released
 
 
 def test_the_first_of_several_software_devices_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -75,6 +89,31 @@ def test_no_device_is_explained_with_every_attempt_and_the_remedy(monkeypatch: p
     assert "found 2 devices" in message
     assert "apt-get install -y libegl1" in message
     assert "\n" not in message
+
+
+def test_a_context_is_kept_for_the_next_that_asks_with_its_programs() -> None:
+    with module.open_context() as context:
+        program = build_program(context, ("blank.vert",), ("blank.frag",))
+        with module.open_context() as other:
+            assert other is not context
+    for _ in range(2):
+        with module.open_context() as again:
+            assert again is context
+            assert build_program(again, ("blank.vert",), ("blank.frag",)) is program
+            again.texture((4, 4), 4).release()
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(lambda: module.idle.contexts).result() == []
+
+
+def test_a_context_with_an_error_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second = FakeContext("llvmpipe"), FakeContext("llvmpipe")
+    devices(monkeypatch, [first])
+    with module.open_context():
+        first.error = "GL_OUT_OF_MEMORY"
+    assert first.released
+    devices(monkeypatch, [second])
+    with module.open_context() as context:
+        assert context is second
 
 
 def test_a_context_is_released_when_its_block_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,6 +87,41 @@ def test_results_in_the_folder_that_is_searched_are_no_assets(tmp_path: Path) ->
     assert [job.name for job in find_jobs([tmp_path], tmp_path / "out", Options(), Outputs())] == ["a.obj"]
 
 
+def reported(folder: Path, name: str, *files: str) -> None:
+    """A report of flexpara that lists files."""
+    facts = {"producer": "flexpara 0.1", "files": [name, *files]}
+    (folder / name).write_text(json.dumps(facts), encoding="utf-8")
+
+
+def test_results_that_a_report_beside_them_lists_are_no_assets_and_that_is_said(tmp_path: Path) -> None:
+    for name in ("a.obj", "earlier/a.glb", "earlier/b.obj", "a.glb"):
+        mesh(tmp_path / name)
+    reported(tmp_path, "a.report.json", "a.glb", "a.onnx")
+    reported(tmp_path / "earlier", "page.json", "a.glb")
+    said: list[str] = []
+    found = find_jobs([tmp_path], tmp_path / "out", Options(), Outputs(), said.append)
+    assert [job.name for job in found] == ["a.obj", "earlier/b.obj"]
+    assert len(said) == 1
+    assert "2 meshes are results of flexpara" in said[0]
+
+
+def test_a_result_that_is_named_or_listed_is_an_asset(tmp_path: Path) -> None:
+    result = mesh(tmp_path / "a.glb")
+    reported(tmp_path, "a.report.json", "a.glb")
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text('{"file": "a.glb"}', encoding="utf-8")
+    assert [job.run.mesh for job in jobs_of(result)] == [job.run.mesh for job in jobs_of(listed)] == [result]
+    with pytest.raises(MissingFileError, match="no mesh but results of flexpara"):
+        jobs_of(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"files": ["a.obj"]}', '{"producer": "other", "files": ["a.obj"]}'])
+def test_reports_of_others_hide_no_asset(text: str, tmp_path: Path) -> None:
+    mesh(tmp_path / "a.obj")
+    (tmp_path / "a.report.json").write_text(text, encoding="utf-8")
+    assert [job.name for job in jobs_of(tmp_path)] == ["a.obj"]
+
+
 def test_names_that_are_no_text_are_spelled_out(tmp_path: Path) -> None:
     for name in (b"\xff.obj", b"a\x1b[2J\n.obj", "ü.obj".encode()):
         mesh(tmp_path / os.fsdecode(name))
