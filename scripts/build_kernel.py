@@ -15,7 +15,7 @@ from setuptools.errors import CompileError
 
 FLAGS = {"msvc": ["/std:c++17", "/O2", "/fp:precise", "/EHsc"]}
 """Of each compiler that does not take GCC's."""
-GCC_FLAGS = ["-std=c++17", "-O3", "-g0", "-fvisibility=hidden", "-ffp-contract=off"]
+GCC_FLAGS = ["-std=c++17", "-O3", "-g0", "-fvisibility=hidden", "-ffp-contract=off", "-pthread"]
 """Sums and products are rounded one by one: the exact tests rely on it, and machines agree."""
 
 
@@ -49,7 +49,9 @@ class BuildKernel(build_ext):
     def build_extension(self, ext: Extension) -> None:
         """Compile one extension."""
         ext.include_dirs += [eigen(), pybind()]
-        ext.extra_compile_args += FLAGS.get(self.compiler.compiler_type, GCC_FLAGS)
+        kind = self.compiler.compiler_type
+        ext.extra_compile_args += FLAGS.get(kind, GCC_FLAGS)
+        ext.extra_link_args += [] if kind in FLAGS else ["-pthread"]
         super().build_extension(ext)
 
 

@@ -20,10 +20,12 @@ from ..mesh import Frame, Surface
 from .distortion import TRIM, singular_values, symmetric_dirichlet
 from .gaps import smallest_chart_gap
 from .overlap import orientation_sign, overlap_area, overlapping_pairs
-from .topology import EdgeTable, edge_table, face_components
+from .topology import EdgeTable, edge_table, face_components, next_halfedge
 from .triangles import corner_angles, edge_lengths, jacobians, signed_areas
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
 _NO_AREA = 1e-14
@@ -163,21 +165,41 @@ def uv_charts(
         disagree in uv.
     """
     table = table or edge_table(faces)
-    edge = table.face_edges.reshape(-1)
-    order = np.argsort(edge, kind="stable")
-    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    ends = np.stack([corner_uv, np.roll(corner_uv, -1, axis=1)], axis=2).reshape(-1, 2, 2)
-    ends = np.where((start > end)[:, None, None], ends[:, ::-1], ends)
     tolerance = _SAME_UV * float(np.ptp(corner_uv.reshape(-1, 2), axis=0).max())
     seam = np.zeros(len(table.edges), dtype=bool)
     joined: list[NDArray[np.int64]] = []
-    for step in range(1, int(table.edge_count.max(initial=1))):
-        a, b = order[:-step], order[step:]
-        a, b = a[edge[a] == edge[b]], b[edge[a] == edge[b]]
-        same = np.abs(ends[a] - ends[b]).max(axis=(1, 2)) <= tolerance
-        seam[edge[a[~same]]] = True
-        joined.append(np.stack([a[same] // 3, b[same] // 3], axis=1))
+    for one, other in _meeting_halfedges(table):
+        same = _same_ends(faces.reshape(-1), corner_uv.reshape(-1, 2), one, other, tolerance)
+        seam[table.face_edges.reshape(-1)[one[~same]]] = True
+        joined.append(np.stack([one[same] // 3, other[same] // 3], axis=1))
     return face_components(len(faces), np.concatenate([np.zeros((0, 2), dtype=np.int64), *joined])), seam
+
+
+def _meeting_halfedges(table: EdgeTable) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Pairs of half-edges (p,) and (p,) along one edge, each pair once."""
+    half = table.edge_halfedges[table.edge_count == 2]
+    yield half[:, 0], half[:, 1]
+    half = np.flatnonzero((table.edge_count > 2)[table.face_edges.reshape(-1)])
+    half = half[np.argsort(table.face_edges.reshape(-1)[half], kind="stable")]
+    edge = table.face_edges.reshape(-1)[half]
+    for step in range(1, int(table.edge_count.max(initial=1)) if len(half) else 1):
+        together = edge[:-step] == edge[step:]
+        yield half[:-step][together], half[step:][together]
+
+
+def _same_ends(
+    vertex: NDArray[np.int64],
+    uv: NDArray[np.float64],
+    one: NDArray[np.int64],
+    other: NDArray[np.int64],
+    tolerance: float,
+) -> NDArray[np.bool_]:
+    """(p,) bool: the uv (c, 2) of corners at both ends of two half-edges (p,) agree; vertex (c,) of each corner."""
+    alike = vertex[one] == vertex[other]  # else they run against each other
+    ahead = next_halfedge(other)
+    begin, end = np.where(alike, other, ahead), np.where(alike, ahead, other)
+    gap = np.abs(uv[one] - uv[begin]).max(axis=1, initial=0.0)
+    return np.maximum(gap, np.abs(uv[next_halfedge(one)] - uv[end]).max(axis=1, initial=0.0)) <= tolerance
 
 
 def bleed_free_mip(gap: float) -> int:

@@ -123,7 +123,7 @@ def components(faces: NDArray[np.int64], table: EdgeTable | None = None) -> NDAr
     Faces that share only a vertex are not connected; all faces along a non-manifold edge are.
     """
     table = table or edge_table(faces)
-    half_order = np.argsort(table.face_edges.reshape(-1), kind="stable")
+    half_order = stable_order(table.face_edges.reshape(-1), len(table.edges))
     edge = table.face_edges.reshape(-1)[half_order]
     same = edge[1:] == edge[:-1]
     return face_components(len(faces), np.stack([half_order[:-1][same] // 3, half_order[1:][same] // 3], axis=1))
@@ -132,7 +132,14 @@ def components(faces: NDArray[np.int64], table: EdgeTable | None = None) -> NDAr
 def euler_characteristic(faces: NDArray[np.int64], table: EdgeTable | None = None) -> int:
     """V − E + F over the vertices in use: 2 for a sphere, 1 for a disk, 0 for an annulus or torus."""
     table = table or edge_table(faces)
-    return len(np.unique(faces)) - len(table.edges) + len(faces)
+    return vertices_used(faces) - len(table.edges) + len(faces)
+
+
+def vertices_used(faces: NDArray[np.int64]) -> int:
+    """How many different vertices faces (f, 3) name."""
+    used = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
+    used[faces] = True
+    return int(np.count_nonzero(used))
 
 
 def is_manifold(faces: NDArray[np.int64], table: EdgeTable | None = None) -> bool:
@@ -140,7 +147,7 @@ def is_manifold(faces: NDArray[np.int64], table: EdgeTable | None = None) -> boo
     table = table or edge_table(faces)
     if not bool(np.all(table.manifold | table.boundary)):
         return False
-    return len(split_non_manifold_vertices(faces, table=table)[1]) == len(np.unique(faces))
+    return len(split_non_manifold_vertices(faces, table=table)[1]) == vertices_used(faces)
 
 
 def split_non_manifold_vertices(

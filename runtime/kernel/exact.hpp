@@ -13,12 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "rim.hpp"
+
 namespace flexpara {
 
 struct OutOfRange {};
-
-using Point = std::array<double, 2>;
-using Triangle = std::array<Point, 3>;
 
 inline void check_range(const double* values, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -87,10 +86,8 @@ class Overlaps {
             triangles_.push_back(triangle);
             ids_.push_back(std::int64_t(f));
         }
-        measure();
-        order_.resize(triangles_.size());
-        std::iota(order_.begin(), order_.end(), 0);
-        if (!order_.empty()) build(0, int(order_.size()));
+        if (triangles_.size() >= kMany && !overlaps_at_rim()) return;
+        plant();
     }
 
     // Calls found(lower, higher) for each pair that overlaps, until it returns false.
@@ -100,6 +97,28 @@ class Overlaps {
     }
 
    private:
+    explicit Overlaps(std::vector<Triangle> triangles) : triangles_(std::move(triangles)), ids_(triangles_.size()) {
+        std::iota(ids_.begin(), ids_.end(), 0);
+        plant();
+    }
+
+    // Whether any overlap, from those near the rim alone.
+    bool overlaps_at_rim() const {
+        std::vector<Triangle> near;
+        for (int i : near_rim(triangles_)) near.push_back(triangles_[i]);
+        bool any = near.size() > triangles_.size() / 2;  // a tree of all takes no longer
+        if (!any) Overlaps(std::move(near)).each([&](std::int64_t, std::int64_t) { return !(any = true); });
+        return any;
+    }
+
+    void plant() {
+        measure();
+        order_.resize(triangles_.size());
+        std::iota(order_.begin(), order_.end(), 0);
+        if (!order_.empty()) build(0, int(order_.size()));
+    }
+
+    static constexpr std::size_t kMany = 2000;  // triangles from which on the rim is looked at first
     static constexpr int kAxes = 3;  // x, y, and across the direction of most edge length: needles aslant, side by side
     static constexpr int kLeaf = 4;
     struct Box {

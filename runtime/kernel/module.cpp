@@ -4,12 +4,13 @@
 
 #include <limits>
 
+#include "cloud.hpp"
 #include "conformal.hpp"
 #include "exact.hpp"
 #include "paths.hpp"
+#include "rigid.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
-#include "twolevel.hpp"
 
 namespace py = pybind11;
 using namespace flexpara;
@@ -25,6 +26,10 @@ static const Indices& checked(const Indices& indices, Index bound = std::numeric
     for (py::ssize_t i = 0; i < indices.size(); ++i)
         if (indices.data()[i] < 0 || indices.data()[i] >= bound) throw py::index_error("an index is out of range");
     return indices;
+}
+
+static void demand(bool holds, const char* fault) {
+    if (!holds) throw py::value_error(fault);
 }
 
 static Points3 points_of(const Numbers& array) {
@@ -70,8 +75,10 @@ static Rows rows_of(const py::object& matrix) {
 static void define_solvers(py::module_& module) {
     py::class_<TwoLevel>(module, "TwoLevel")
         .def(py::init([](const py::object& matrix, const py::object& weights, const py::object& coarse,
-                         double tolerance, int most) {
-            return TwoLevel(rows_of(matrix), rows_of(weights), rows_of(coarse), tolerance, most);
+                         double tolerance, int most, int threads) {
+            const Rows all = rows_of(matrix), shares = rows_of(weights), few = rows_of(coarse);
+            py::gil_scoped_release free;
+            return TwoLevel(all, shares, few, tolerance, most, threads);
         }))
         .def("solve", [](const TwoLevel& solver, const Numbers& right, const Numbers& start, double size) {
             TwoLevel::Pairs wanted(right.shape(0)), found(right.shape(0));
@@ -84,6 +91,33 @@ static void define_solvers(py::module_& module) {
                 solver.solve(wanted, found, size);
             }
             return array_of<double>(found.empty() ? nullptr : found[0].data(), 2 * found.size(), 2);
+        });
+    py::class_<Rigid>(module, "Rigid")
+        .def(py::init([](const Numbers& points, const Indices& faces, int threads) {
+            auto vertices = points_of(points);
+            auto corners = faces_of(checked(faces, points.shape(0)));
+            py::gil_scoped_release free;
+            return Rigid(vertices, std::move(corners), threads);
+        }))
+        .def("stiffness", [](const Rigid& of) {  // values, columns, where rows begin: as scipy takes them
+            const Rows found = of.stiffness();
+            return py::make_tuple(array_of(found.value), array_of(found.column), array_of(found.begin));
+        })
+        .def("jacobians", [](const Rigid& of, const Numbers& uv) {
+            demand(uv.size() == 2 * of.vertices(), "uv of another piece");
+            py::array_t<double> found({of.faces(), py::ssize_t(2), py::ssize_t(2)});
+            double* into = found.mutable_data();
+            py::gil_scoped_release free;
+            of.jacobians(uv.data(), into);
+            return found;
+        })
+        .def("right", [](const Rigid& of, const Numbers& turn) {
+            demand(turn.size() == 4 * of.faces(), "Jacobians of another piece");
+            py::array_t<double> found({of.vertices(), py::ssize_t(2)});
+            double* into = found.mutable_data();
+            py::gil_scoped_release free;
+            of.right(turn.data(), into);
+            return found;
         });
 }
 
@@ -219,11 +253,46 @@ static void define_topology(py::module_& module) {
     });
 }
 
+static Cloud cloud_of(const Numbers& points, const Indices& neighbours) {
+    checked(neighbours, points.shape(0));
+    demand(neighbours.shape(0) == points.shape(0) && points.shape(1) == 3, "neighbours of other points");
+    return {points.data(), neighbours.data(), std::size_t(points.shape(0)), std::size_t(neighbours.shape(1))};
+}
+
+static void define_clouds(py::module_& module) {
+    module.def("planes", [](const Numbers& points, const Indices& neighbours, const Numbers& weight,
+                            const Numbers& scale, int rounds, int threads) {
+        const Cloud cloud = cloud_of(points, neighbours);
+        demand(weight.shape(0) == points.shape(0) && weight.shape(1) <= neighbours.shape(1) &&
+               scale.size() == points.shape(0), "weights of other neighbours");
+        py::array_t<double> normals({points.shape(0), py::ssize_t(3)});
+        double* into = normals.mutable_data();
+        py::gil_scoped_release free;
+        planes(cloud, weight.shape(1), weight.data(), scale.data(), rounds, threads, into);
+        return normals;
+    });
+    // (t, 3); across, along: the frame of each point's plane; most, opposite, steep: of CloudConfig.
+    module.def("stars", [](const Numbers& points, const Indices& neighbours, const Numbers& across,
+                           const Numbers& along, const Numbers& normals, int most, double opposite, double steep,
+                           int threads) {
+        const Cloud cloud = cloud_of(points, neighbours);
+        for (const auto* of : {&across, &along, &normals})
+            demand(of->size() == points.size(), "frames of other points");
+        std::vector<Index> found;
+        {
+            py::gil_scoped_release free;
+            found = stars(cloud, across.data(), along.data(), normals.data(), {most, opposite, steep}, threads);
+        }
+        return array_of(found, 3);
+    });
+}
+
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 2;
+    module.attr("edition") = 3;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);
     define_topology(module);
+    define_clouds(module);
 }

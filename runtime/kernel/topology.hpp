@@ -37,6 +37,8 @@ inline EdgeTable edge_table(const Index* faces, std::size_t count) {
         sorted[filled[std::min(faces[h], end_of(h))]++] = {std::max(faces[h], end_of(h)), Index(h)};
     EdgeTable table;
     table.face_edges.resize(halves);
+    for (auto* pairs : {&table.edges, &table.edge_faces, &table.edge_halfedges}) pairs->reserve(halves / 2 + halves / 8);
+    table.edge_count.reserve(halves / 2 + halves / 8);
     for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
         std::sort(sorted.begin() + begin[low], sorted.begin() + begin[low + 1]);
         for (Index at = begin[low]; at < begin[low + 1]; ++at) {
@@ -134,14 +136,25 @@ inline std::vector<Index> boundary_halfedges(const EdgeTable& table) {
 }
 
 // The border as closed loops of vertices, longest first, then by lowest vertex.
+// Only faces with a corner on it are taken apart: all fans of its vertices are there.
 inline std::vector<std::vector<Index>> boundary_loops(const Index* faces, std::size_t count) {
-    const EdgeTable table = edge_table(faces, count);
+    std::vector<char> rim(vertex_span(faces, 3 * count), 0);
+    const EdgeTable whole = edge_table(faces, count);
+    for (std::size_t e = 0; e < whole.edges.size(); ++e)
+        if (!whole.manifold[e]) rim[whole.edges[e][0]] = rim[whole.edges[e][1]] = 1;
+    std::vector<Index> near;
+    for (std::size_t f = 0; f < count; ++f)
+        if (rim[faces[3 * f]] || rim[faces[3 * f + 1]] || rim[faces[3 * f + 2]])
+            near.insert(near.end(), faces + 3 * f, faces + 3 * f + 3);
+    const EdgeTable table = edge_table(near.data(), near.size() / 3);
     std::vector<char> joined(table.manifold);
-    const Opened split = opened(faces, count, table.edge_halfedges.empty() ? nullptr : table.edge_halfedges[0].data(),
+    const Opened split = opened(near.data(), near.size() / 3,
+                                table.edge_halfedges.empty() ? nullptr : table.edge_halfedges[0].data(),
                                 reinterpret_cast<const bool*>(joined.data()), joined.size());
     std::vector<Index> successor(split.old.size(), -1);
-    for (Index half : boundary_halfedges(edge_table(split.faces.data(), count)))
-        successor[split.faces[half]] = split.faces[next_halfedge(half)];
+    for (Index half : boundary_halfedges(edge_table(split.faces.data(), near.size() / 3)))
+        if (rim[near[half]] && rim[near[next_halfedge(half)]])
+            successor[split.faces[half]] = split.faces[next_halfedge(half)];
     std::vector<std::vector<Index>> loops;
     for (std::size_t first = 0; first < successor.size(); ++first) {
         if (successor[first] < 0) continue;

@@ -39,7 +39,7 @@ def hole_triangles(
     """
     whole = [loop for loop in boundary_loops(faces) if len(loop) <= config.touching_holes * config.hole_edges]
     loops = [simple[::-1] for loop in whole for simple in simple_loops(loop) if 3 <= len(simple) <= config.hole_edges]
-    taken = set(_edge_keys(faces, len(points)).tolist())
+    there, taken = np.sort(_edge_keys(faces, len(points))), set[int]()
     closed: list[NDArray[np.int64]] = [np.zeros((0, 3), dtype=np.int64)]
     for length in sorted({len(loop) for loop in loops}):
         batch = np.stack([loop for loop in loops if len(loop) == length])
@@ -47,16 +47,17 @@ def hole_triangles(
         for triangles in _best(points, normals, batch, config):
             inner = _edge_keys(triangles, len(points))
             values, counts = np.unique(inner, return_counts=True)
-            diagonals = set(values[counts == 2].tolist())
-            if not diagonals & taken:
-                taken |= diagonals
+            diagonals = values[counts == 2]
+            place = np.minimum(np.searchsorted(there, diagonals), len(there) - 1)
+            if (there[place] != diagonals).all() and taken.isdisjoint(diagonals.tolist()):
+                taken |= set(diagonals.tolist())
                 closed.append(triangles)
     return np.concatenate(closed)
 
 
 def simple_loops(loop: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """A closed loop (n,) taken apart where it comes back to a vertex: holes that touch there."""
-    if len(np.unique(loop)) == len(loop):
+    if len(set(loop.tolist())) == len(loop):
         return [loop]
     done: list[NDArray[np.int64]] = []
     path: list[int] = []

@@ -14,6 +14,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import KDTree
 
+from ...runtime.cores import core_count
+from ...runtime.geometry.rows import distinct
+from ...runtime.kernel.choice import kernel
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -34,9 +38,50 @@ def nearest_neighbours(points: NDArray[np.float64], k: int) -> tuple[NDArray[np.
     Returns:
         (d, k) int64 indices and (d, k) float64 distances, ascending.
     """
-    found, place = KDTree(points).query(points, k=min(k + 1, len(points)), workers=-1)
+    return neighbours_of(np.arange(len(points)), points, k)
+
+
+def neighbours_of(
+    rows: NDArray[np.int64], points: NDArray[np.float64], k: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The same for some of the points: rows (m,) → (m, k) and (m, k).
+
+    They are asked for in the order of the tree's leaves, one after the other in the same place of memory.
+    """
+    tree = KDTree(points)
+    wanted = np.zeros(len(points), dtype=bool)
+    wanted[rows] = True
+    order = tree.indices[wanted[tree.indices]]
+    found, place = tree.query(points[order], k=min(k + 1, len(points)), workers=core_count())
+    row = np.full(len(points), -1)
+    row[order] = np.arange(len(order))
     distance, index = np.asarray(found, dtype=np.float64), np.asarray(place, dtype=np.int64)
-    return index[:, 1:], distance[:, 1:]
+    return index[row[rows], 1:], distance[row[rows], 1:]
+
+
+def thinned_out(
+    points: NDArray[np.float64], k: int, closest: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Points that are not closer to an earlier one than a share ``closest`` of their spacing.
+
+    Returns:
+        (m,) int64 those points, and (m, k) int64 and (m, k) float64 their nearest neighbours among themselves.
+    """
+    chosen = np.arange(len(points))
+    index, distance = nearest_neighbours(points, k)
+    while True:
+        spacing = local_spacing(distance)
+        apart: NDArray[np.bool_] = (distance[:, 0] >= closest * spacing) | (index[:, 0] > np.arange(len(chosen)))
+        if apart.all():
+            return chosen, index, distance
+        number = np.full(len(chosen), -1)
+        number[apart] = np.arange(np.count_nonzero(apart))
+        chosen, index, distance = chosen[apart], number[index[apart]], distance[apart]
+        stale = np.flatnonzero((index < 0).any(axis=1))  # all others have the neighbours that they had
+        if len(chosen) <= index.shape[1]:
+            index, distance = nearest_neighbours(points[chosen], k)
+        else:
+            index[stale], distance[stale] = neighbours_of(stale, points[chosen], k)
 
 
 def local_spacing(distance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -67,18 +112,16 @@ def fitted_normals(
         (d, 3) float64 unit.
     """
     k = min(config.plane_neighbours, index.shape[1])
-    normals = np.zeros_like(points)
     scale = config.plane_scale * local_spacing(distance)
-    for start in range(0, len(points), _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        around = np.concatenate(
-            [np.zeros((len(index[rows]), 1, 3)), points[index[rows, :k]] - points[rows, None]], axis=1
-        )
-        reach = distance[rows, k - 1, None]
-        near = np.exp(-2.0 * (np.linalg.norm(around, axis=2) / reach) ** 2)
-        if given is not None:
-            near[:, 1:] *= np.einsum("bkc,bc->bk", given[index[rows, :k]], given[rows]) > config.opposite
-        normals[rows] = _planes(around, near, scale[rows, None], config.plane_rounds)
+    weight = np.exp(-2.0 * (distance[:, :k] / distance[:, k - 1, None]) ** 2)
+    if given is not None:
+        for start in range(0, len(points), _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            weight[rows] *= np.einsum("bkc,bc->bk", given[index[rows, :k]], given[rows]) > config.opposite
+    if compiled := kernel():
+        normals = compiled.planes(points, index, weight, scale, config.plane_rounds, core_count())
+    else:
+        normals = planes(points, index[:, :k], weight, scale, config.plane_rounds)
     if given is None:
         return normals
     cosine = np.einsum("dc,dc->d", normals, given)
@@ -86,10 +129,31 @@ def fitted_normals(
     return np.where(doubtful[:, None], given, normals * np.where(cosine < 0.0, -1.0, 1.0)[:, None])
 
 
+def planes(
+    points: NDArray[np.float64],
+    index: NDArray[np.int64],
+    weight: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    rounds: int,
+) -> NDArray[np.float64]:
+    """(d, 3) unit normals, of either sign, of planes through points (d, 3) and neighbours (d, k) of weights (d, k).
+
+    A point off its plane by scale (d,) counts half in the next of the rounds.
+    """
+    normals = np.zeros_like(points)
+    for start in range(0, len(points), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        way = points[index[rows]] - points[rows, None]
+        around = np.concatenate([np.zeros((len(way), 1, 3)), way], axis=1)
+        near = np.concatenate([np.ones((len(way), 1)), weight[rows]], axis=1)
+        normals[rows] = _planes(around, near, scale[rows, None], rounds)
+    return normals
+
+
 def _planes(
     around: NDArray[np.float64], near: NDArray[np.float64], scale: NDArray[np.float64], rounds: int
 ) -> NDArray[np.float64]:
-    """(b, 3) unit normals of planes through offsets (b, k, 3) of weights (b, k); off by scale (b, 1) counts half."""
+    """(b, 3) of offsets (b, k, 3) of weights (b, k); scale (b, 1)."""
     weight, normal = near, np.zeros((len(around), 3))
     for number in range(rounds + 1):
         total = weight / weight.sum(axis=1, keepdims=True)
@@ -186,7 +250,7 @@ def _links(
     count, k = index.shape
     start = np.repeat(np.arange(count), k)
     end = index.reshape(-1)
-    key = np.unique(np.minimum(start, end) * count + np.maximum(start, end))
+    key = distinct(np.minimum(start, end) * count + np.maximum(start, end))
     one, other = key // count, key % count
     return one, other, _agreement(points, normals, one, other)
 

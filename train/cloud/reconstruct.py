@@ -15,13 +15,14 @@ import igl
 import numpy as np
 
 from ...runtime.errors import MeshError
+from ...runtime.geometry.rows import compacted
 from ...runtime.geometry.topology import components, split_non_manifold_vertices
 from ...runtime.geometry.triangles import corner_angles
 from ...runtime.io.points.cloud import CloudMesh, distinct_points, with_changes
 from ...runtime.mesh import Asset, Surface
 from .config import CloudConfig
 from .holes import hole_triangles
-from .normals import disagreement, fitted_normals, local_spacing, nearest_neighbours, oriented_normals, turned_to
+from .normals import disagreement, fitted_normals, local_spacing, oriented_normals, thinned_out, turned_to
 from .stars import star_candidates
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ def reconstruct(cloud: PointCloud, config: CloudConfig | None = None) -> CloudMe
             f"{cloud.stem}: {len(local.points)} points make no triangles, expected points spread over a surface; "
             "give more of them"
         )
-    used = np.unique(faces)
-    surface = Surface(local.points[used], np.searchsorted(used, faces))
+    used, faces = compacted(faces)
+    surface = Surface(local.points[used], faces)
     user = distinct.first[local.chosen[used]]
     vertex = np.full(len(distinct.first), -1, dtype=np.int64)
     vertex[local.chosen[used]] = np.arange(len(used))
@@ -107,15 +108,8 @@ def _asset(
 
 def _local(distinct: DistinctPoints, config: CloudConfig) -> _Local:
     """Points that aren't too close to an earlier one, their neighbours, and oriented normals."""
-    chosen = np.arange(len(distinct.points))
-    while True:
-        points = distinct.points[chosen]
-        index, distance = nearest_neighbours(points, config.neighbours)
-        spacing = local_spacing(distance)
-        apart: NDArray[np.bool_] = (distance[:, 0] >= config.closest * spacing) | (index[:, 0] > np.arange(len(chosen)))
-        if apart.all():
-            break
-        chosen = chosen[np.flatnonzero(apart)]
+    chosen, index, distance = thinned_out(distinct.points, config.neighbours, config.closest)
+    points, spacing = distinct.points[chosen], local_spacing(distance)
     given = None if distinct.normals is None else distinct.normals[chosen]
     links = index[:, : config.tree_neighbours]
     disordered = given is not None and disagreement(points, given, links, config) > config.reorient
@@ -185,12 +179,17 @@ def without_pinches(points: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
     """The faces (f, 3) int64 without the smaller fans (by angle) of vertices where several meet."""
     while True:
         split, old = split_non_manifold_vertices(faces)
-        angle = np.bincount(split.reshape(-1), corner_angles(points[faces]).reshape(-1), minlength=len(old))
-        order = np.lexsort((-angle, old))
+        several = np.append(False, old[1:] == old[:-1])
+        several[:-1] |= several[1:]  # fans of vertices that have two or more
+        if not several.any():
+            return faces
+        near = np.flatnonzero(several[split].any(axis=1))
+        corner, angle = split[near].reshape(-1), corner_angles(points[faces[near]]).reshape(-1)
+        width = np.bincount(corner, angle, minlength=len(old))
+        fans = np.flatnonzero(several)
+        order = fans[np.lexsort((-width[fans], old[fans]))]
         smaller = np.zeros(len(old), dtype=np.bool_)
         smaller[order[1:][old[order][1:] == old[order][:-1]]] = True
-        if not smaller.any():
-            return faces
         faces = faces[~smaller[split].any(axis=1)]
 
 
@@ -207,10 +206,9 @@ def _places(
     surface: Surface, distinct: DistinctPoints, vertex: NDArray[np.int64], extrapolation: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Face (d,) and weights (d, 3) of its corners for each distinct point; vertex (d,) is −1 where it has none."""
-    area = surface.face_areas()
-    corner = np.arange(surface.faces.size)
-    order = np.lexsort((corner, -area[corner // 3], surface.faces.reshape(-1)))
-    largest = order[np.searchsorted(surface.faces.reshape(-1)[order], np.arange(len(surface.vertices)))]
+    rank = np.argsort(-surface.face_areas(), kind="stable")[::-1]
+    largest = np.zeros(len(surface.vertices), dtype=np.int64)
+    largest[surface.faces[rank]] = 3 * rank[:, None] + np.arange(3)  # the last one that is written stays
     face, weight = np.zeros(len(vertex), dtype=np.int64), np.zeros((len(vertex), 3))
     on, off = np.flatnonzero(vertex >= 0), np.flatnonzero(vertex < 0)
     face[on] = largest[vertex[on]] // 3

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
+from ...runtime.cores import core_count
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import within_rings
+from ...runtime.kernel.choice import kernel
 from .curvature import factorize
 
 if TYPE_CHECKING:
@@ -38,6 +40,53 @@ def factorized(matrix: sparse.csr_array) -> Solve:
     return lambda right, _start, _size: solver.solve(np.ascontiguousarray(right))
 
 
+class Slopes:
+    """Gradients G of a piece's faces, and their areas W."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.gradient = gradient(surface)
+        self.weight = np.tile(surface.face_areas(), 2)
+
+    @staticmethod
+    def of(surface: Surface) -> Slopes:
+        """The slopes of a piece."""
+        return Compiled(surface) if kernel() else Slopes(surface)
+
+    def stiffness(self) -> sparse.csr_array:
+        """(v, v) Gᵀ W G."""
+        return sparse.csr_array(self.gradient.T @ sparse.diags_array(self.weight) @ self.gradient)
+
+    def jacobians(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(f, 2, 2) of uv (v, 2)."""
+        return np.stack(np.split(self.gradient @ uv, 2), axis=2)
+
+    def right(self, turn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(v, 2) Gᵀ W turn of Jacobians turn (f, 2, 2)."""
+        return self.gradient.T @ (np.concatenate([turn[:, :, 0], turn[:, :, 1]]) * self.weight[:, None])
+
+
+class Compiled(Slopes):
+    """The same by the kernel."""
+
+    def __init__(self, surface: Surface) -> None:
+        compiled = kernel()
+        assert compiled is not None
+        self._rigid = compiled.Rigid(surface.vertices, surface.faces, core_count())
+        self.count = len(surface.vertices)
+
+    def stiffness(self) -> sparse.csr_array:
+        """As above."""
+        return sparse.csr_array(self._rigid.stiffness(), shape=(self.count, self.count))
+
+    def jacobians(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """As above."""
+        return self._rigid.jacobians(uv)
+
+    def right(self, turn: NDArray[np.float64]) -> NDArray[np.float64]:
+        """As above."""
+        return self._rigid.right(turn)
+
+
 class RigidSteps:
     """The local and global steps for one piece."""
 
@@ -49,10 +98,8 @@ class RigidSteps:
     ) -> None:
         """``solver``: of the one matrix of all steps.  ``pins`` draw their vertices to their places."""
         self.surface = surface
-        self.areas = surface.face_areas()
-        self.gradient = gradient(surface)
-        weight = np.r_[self.areas, self.areas]
-        matrix = (self.gradient.T @ sparse.diags_array(weight) @ self.gradient).tocsr()
+        self.slopes = Slopes.of(surface)
+        matrix = self.slopes.stiffness()
         held = np.zeros(len(surface.vertices))
         held[0] = PIN * matrix.diagonal().mean()
         self.pull = np.zeros((len(surface.vertices), 2))
@@ -62,17 +109,15 @@ class RigidSteps:
         self.system = solver((matrix + sparse.diags_array(held)).tocsr())
 
     def jacobians(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(f, 2, 2) as ``flatten.jacobians`` of uv (v, 2), from the gradient that is there."""
-        along, across = np.split(self.gradient @ uv, 2)
-        return np.stack([along, across], axis=2)
+        """(f, 2, 2) as ``flatten.jacobians`` of uv (v, 2), from the gradients that are there."""
+        return self.slopes.jacobians(uv)
 
     def solve(self, turn: NDArray[np.float64], start: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Uv (v, 2) whose Jacobians are nearest to turn (f, 2, 2), rotations mostly, weighted by area.
 
         ``start`` (v, 2): where a solver that needs steps begins.
         """
-        target = np.concatenate([turn[:, :, 0], turn[:, :, 1]]) * np.r_[self.areas, self.areas][:, None]
-        right = self.gradient.T @ target
+        right = self.slopes.right(turn)
         return self.system(right + self.pull, start, float(np.linalg.norm(right)))
 
     def run(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
+from ...runtime.cores import core_count
 from ...runtime.kernel.choice import kernel
 from .curvature import factorize
 
@@ -40,7 +41,9 @@ class TwoLevel:
     def compiled(self) -> Any | None:
         """The same by the kernel, for two columns."""
         compiled = kernel()
-        return compiled and compiled.TwoLevel(self.matrix, self.coarse, self.small, self.tolerance, self.most)
+        if compiled is None:
+            return None
+        return compiled.TwoLevel(self.matrix, self.coarse, self.small, self.tolerance, self.most, core_count())
 
     def solve(self, right: NDArray[np.float64], start: NDArray[np.float64] | None, size: float) -> NDArray[np.float64]:
         """X (n, c) for right sides (n, c), from ``start``: each column by itself, all at once; size: of residuals."""

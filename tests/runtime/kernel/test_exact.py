@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from flexpara.runtime.geometry.overlap import orientation_sign, overlapping_pairs, overlaps_anywhere
 from flexpara.runtime.kernel.choice import kernel, twins_only
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 pytestmark = pytest.mark.skipif(kernel() is None, reason="nothing was compiled")
 
@@ -72,3 +77,56 @@ def test_coordinates_too_small_for_the_kernel_are_left_to_the_twin() -> None:
     assert compiled.orientation_sign(*tiny) is None
     assert orientation_sign(*tiny).tolist() == [1]
     assert both(np.concatenate([ONE, ONE]) * 1e-200).tolist() == [[0, 1]]
+
+
+def sheet(side: int) -> tuple[np.ndarray, np.ndarray]:
+    """A jittered grid of 2 · side² triangles: points (v, 2) and faces (f, 3)."""
+    across = np.arange(side + 1.0)
+    points = np.stack(np.meshgrid(across, across, indexing="ij"), axis=2).reshape(-1, 2)
+    points += np.random.default_rng(side).uniform(-0.2, 0.2, points.shape)
+    index = np.arange(len(points)).reshape(side + 1, side + 1)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    return points, np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)]).reshape(-1, 3)
+
+
+def pinched(points: np.ndarray) -> np.ndarray:
+    """A corner of the sheet laid over its inside, by a bend far from it."""
+    return np.where((points[:, :1] > 30.0) & (points[:, 1:] > 30.0), points - 12.3, points)
+
+
+def rolled(points: np.ndarray) -> np.ndarray:
+    """The sheet around a centre, a little more than once."""
+    turn = points[:, 1] / 6.0
+    return (points[:, 0] + 7.0)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+LARGE = {
+    "whole": lambda points: points,
+    "rolled up": rolled,
+    "a corner over the inside": pinched,
+    "one vertex pulled across": lambda points: points + 2.5 * (np.arange(len(points)) == 800)[:, None],
+    "folded in the middle": lambda points: np.abs(points - [20.3, 0.0]),
+}
+
+
+@pytest.mark.parametrize("move", LARGE.values(), ids=list(LARGE))
+def test_of_many_triangles_those_along_the_rim_tell_whether_any_overlap(
+    move: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    points, faces = sheet(40)
+    assert len(faces) > 2000
+    found = both(move(points)[faces])
+    assert (len(found) == 0) == (move is LARGE["whole"])
+
+
+def test_a_map_that_winds_twice_around_a_vertex_overlaps_though_no_triangle_is_flipped() -> None:
+    points, faces = sheet(40)
+    z = (points - points[840]) @ [1.0, 1.0j]
+    twice = z**2 / np.maximum(np.abs(z), 1e-9)
+    uv = np.stack([twice.real, twice.imag], axis=1)[faces]
+    assert len(both(uv)) > 100
+
+
+def test_two_sheets_upon_each_other_overlap_face_by_face() -> None:
+    points, faces = sheet(40)
+    assert len(both(np.concatenate([points[faces], points[faces]]))) >= len(faces)

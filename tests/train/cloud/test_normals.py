@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.runtime.samples import make_sample
 from flexpara.train.cloud.config import CloudConfig
 from flexpara.train.cloud.normals import (
@@ -13,6 +14,7 @@ from flexpara.train.cloud.normals import (
     local_spacing,
     nearest_neighbours,
     oriented_normals,
+    thinned_out,
     turned_to,
 )
 
@@ -113,3 +115,34 @@ def test_unknown_normals_take_the_side_of_known_ones_nearby() -> None:
     index, _ = nearest_neighbours(points, 8)
     given = np.where(np.random.default_rng(9).random((2000, 1)) < 0.3, 0.0, -points)
     np.testing.assert_array_equal(turned_to(points, given, index), -points)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_the_kernels_planes_are_its_twins_up_to_their_sign(noise: float) -> None:
+    if kernel() is None:
+        pytest.skip("nothing was compiled")
+    points = sphere(9000) + noise * np.random.default_rng(7).normal(size=(9000, 3))
+    index, distance = nearest_neighbours(points, CONFIG.neighbours)
+    found = fitted_normals(points, index, distance, CONFIG)
+    with twins_only():
+        expected = fitted_normals(points, index, distance, CONFIG)
+    np.testing.assert_allclose(np.abs((found * expected).sum(axis=1)), 1.0, atol=1e-6)
+
+
+def test_thinning_out_leaves_the_neighbours_that_a_fresh_search_finds() -> None:
+    rng = np.random.default_rng(8)
+    points = sphere(2000)
+    points = np.concatenate([points, points[:300] + 1e-5 * rng.normal(size=(300, 3))])[rng.permutation(2300)]
+    chosen, index, distance = thinned_out(points, CONFIG.neighbours, CONFIG.closest)
+    assert 1990 <= len(chosen) <= 2000
+    fresh = nearest_neighbours(points[chosen], CONFIG.neighbours)
+    np.testing.assert_array_equal(index, fresh[0])
+    np.testing.assert_array_equal(distance, fresh[1])
+
+
+def test_points_that_nearly_all_lie_on_one_keep_the_neighbours_there_are() -> None:
+    near = 1e-9 * np.random.default_rng(9).normal(size=(60, 3))
+    far = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 2.0, 0.0]])
+    chosen, index, _ = thinned_out(np.concatenate([far, near]), CONFIG.neighbours, CONFIG.closest)
+    assert index.shape == (len(chosen), min(CONFIG.neighbours, len(chosen) - 1))
+    assert index.min() >= 0

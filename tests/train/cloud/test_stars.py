@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.train.cloud.config import CloudConfig
 from flexpara.train.cloud.normals import local_spacing, nearest_neighbours
-from flexpara.train.cloud.stars import circumradius, rolled_neighbours, star_candidates, star_pairs
+from flexpara.train.cloud.stars import circumradius, rolled_neighbours, star_candidates, star_pairs, stars
 
 CONFIG = CloudConfig()
 
@@ -66,3 +67,19 @@ def test_nearly_all_triangles_of_a_sphere_are_seen_by_three_corners_and_face_out
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     assert ((normal * corner.mean(axis=1)).sum(axis=1) > 0.0).all()
     assert found.radius.max() <= CONFIG.circumradius
+
+
+@pytest.mark.parametrize("name", ["sphere", "thin sheet", "few"])
+def test_the_kernels_stars_are_its_twins(name: str) -> None:
+    if kernel() is None:
+        pytest.skip("nothing was compiled")
+    rng = np.random.default_rng(6)
+    points = rng.normal(size=(40 if name == "few" else 9000, 3))
+    normals = points / np.linalg.norm(points, axis=1, keepdims=True)
+    points = points * [1.0, 1.0, 0.01] if name == "thin sheet" else normals
+    index, _ = nearest_neighbours(points, CONFIG.neighbours)
+    found = stars(points, normals, index, CONFIG)
+    with twins_only():
+        expected = stars(points, normals, index, CONFIG)
+    assert len(found) > len(points)
+    assert np.array_equal(found[np.lexsort(found.T)], expected[np.lexsort(expected.T)])

@@ -79,7 +79,7 @@ def test_each_step_lowers_the_distance_to_the_rotations() -> None:
 
     def distance(uv: np.ndarray) -> float:
         jacobian = jacobians(surface, uv)
-        return float((((jacobian - nearest_rotations(jacobian)) ** 2).sum(axis=(1, 2)) * rigid.areas).sum())
+        return float((((jacobian - nearest_rotations(jacobian)) ** 2).sum(axis=(1, 2)) * surface.face_areas()).sum())
 
     energy = [distance(start), *(distance(rigid.run(turn, steps)) for steps in (1, 2, 4, 8))]
     assert energy == sorted(energy, reverse=True)

@@ -14,6 +14,7 @@ from flexpara.runtime.geometry.topology import boundary_loops
 from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.finish.arap import Slopes
 from flexpara.train.finish.config import CotangentConfig
 from flexpara.train.finish.contact import boundary_edges, excess_energy
 from flexpara.train.finish.curvature import Curvature, border_first
@@ -110,3 +111,25 @@ def test_a_curvature_travels_to_another_process() -> None:
     rim[:3] = True
     found = Curvature.of(piece, CONFIG)
     assert np.array_equal(pickle.loads(pickle.dumps(found)).factor(rim), found.factor(rim))
+
+
+def test_the_slopes_of_a_piece_are_its_twins(piece: Surface) -> None:
+    rng = np.random.default_rng(5)
+    uv, turn = rng.normal(size=(len(piece.vertices), 2)), rng.normal(size=(len(piece.faces), 2, 2))
+    found, expected = Slopes.of(piece), Slopes(piece)
+    assert type(found) is not type(expected)
+    np.testing.assert_allclose(found.stiffness().toarray(), expected.stiffness().toarray(), atol=1e-12)
+    np.testing.assert_allclose(found.jacobians(uv), expected.jacobians(uv), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.right(turn), expected.right(turn), atol=1e-12)
+
+
+def test_a_face_without_area_has_no_say_in_the_slopes() -> None:
+    flat = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+    slopes = Slopes.of(flat)
+    assert np.isfinite(slopes.stiffness().toarray()).all()
+    assert not slopes.right(np.ones((2, 2, 2)))[3].any()
+
+
+def test_slopes_of_another_piece_are_refused(piece: Surface) -> None:
+    with pytest.raises(ValueError, match="another piece"):
+        Slopes.of(piece).jacobians(np.zeros((len(piece.vertices) + 1, 2)))

@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 from flexpara.runtime.kernel.choice import kernel, twins_only
+from flexpara.train.finish import twolevel
 from flexpara.train.finish.twolevel import TwoLevel
 
 
@@ -80,3 +81,16 @@ def test_the_kernel_solves_as_its_twin_does_and_leaves_what_is_given() -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
     assert not start.any()
     assert np.linalg.norm(right - matrix @ found) <= 1e-9 * size
+
+
+def test_threads_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    if kernel() is None:
+        pytest.skip("nothing was compiled")
+    count = 40_001  # several blocks
+    matrix, right = chain(count), np.random.default_rng(4).normal(size=(count, 2))
+    found = []
+    for threads in (1, 2, 4):
+        monkeypatch.setattr(twolevel, "core_count", lambda threads=threads: threads)
+        found.append(TwoLevel(matrix, hats(count, 8)[:, :-1], 1e-6, 50).solve(right, None, 1.0))
+    assert np.array_equal(found[0], found[1])
+    assert np.array_equal(found[0], found[2])
