@@ -34,6 +34,8 @@ def whole_polygons(surface: Surface, charts: Charts, polygons: Polygons) -> Char
 
     surface: f faces, those of the polygons.
     """
+    if polygons.large == 0:
+        return charts
     work = _Work(surface, charts.face_chart.copy(), charts.corner_uv.copy(), _neighbours(surface.faces))
     inner = _inner_edges(surface.faces, polygons.of_faces)
     if not len(cut := _cut(work, inner)):

@@ -6,20 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
 from ..finish.pieces import Overlapping, Piece
 from ..search.labels import borders_of, connected_pieces, contracted, dual_graph, smooth_labels
 from ..search.search import Search
 from ..workers import parallel_map
-from .layout import carried_uv, features
+from .layout import carried_uv, near_faces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
-    from ..config import CarryConfig, FinishConfig
+    from ..config import FinishConfig
     from ..search.labels import DualGraph
 
 WALL = 1e6
@@ -31,7 +30,8 @@ def carried_back(surface: Surface, coarse: Surface, found: Search, charts: int, 
     keys, label = np.unique(found.label(), return_inverse=True)
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     areas = surface.face_areas()
-    smooth = smoothed_in_band(votes(coarse, label.reshape(-1), surface, config.carry), areas, graph, config)
+    near = near_faces(surface, coarse, config.carry, config.carry.neighbours)
+    smooth = smoothed_in_band(votes(label.reshape(-1)[near]), areas, graph, config)
     limit = max(charts, len(keys))
     piece = fragments_joined(smooth, areas, graph, config.carry.islet)
     search = laid_on(Search(surface, graph, config), piece, smooth, [found.pieces[int(key)] for key in keys])
@@ -100,11 +100,9 @@ def is_the_same(surface: Surface, ids: NDArray[np.int64], source: Piece) -> bool
     return here and np.array_equal(surface.triangles[source.ids], source.flat.surface.triangles)
 
 
-def votes(coarse: Surface, label: NDArray[np.int64], surface: Surface, config: CarryConfig) -> NDArray[np.float64]:
-    """(f, k) share of each label (c,) among the nearest faces of the proxy."""
-    nearest = KDTree(features(coarse, config)).query(features(surface, config), k=config.neighbours)[1]
-    near = label[np.reshape(nearest, (len(surface.faces), config.neighbours))]
-    return np.stack([(near == k).mean(axis=1) for k in range(int(label.max()) + 1)], axis=1)
+def votes(near: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(f, k) share of each label among those of the faces (f, n) of the proxy that are nearest."""
+    return np.stack([(near == k).mean(axis=1) for k in range(int(near.max()) + 1)], axis=1)
 
 
 def smoothed_in_band(

@@ -32,8 +32,7 @@ from ..finish.twolevel import TwoLevel
 from ..search.labels import dual_graph
 from ..search.state import State
 from ..workers import parallel_map
-from .carry import fragments_joined, smoothed_in_band, votes
-from .hurried import crumbs_given, labels_at_once
+from .groups import carried_groups
 from .layout import carried_jacobians
 from .scraps import scraps_given
 from .sides import faces_beside
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
 
     from ..config import FineConfig, FinishConfig
     from ..finish.arap import Solve
-    from ..search.labels import DualGraph
+    from .groups import Group
 
 
 def refined(
@@ -57,58 +56,37 @@ def refined(
     lose all that folds, and what has no layout is projected.
     """
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
-    groups, sources = carried_groups(surface, graph, middle, pieces, config, late)
-    order = sorted(range(len(groups)), key=lambda number: -len(groups[number]))
+    groups = carried_groups(surface, graph, middle, pieces, config, late)
+    groups.sort(key=lambda group: -len(group.ids))
     total = float(surface.face_areas().sum())
-
-    def laid(number: int) -> list[Piece]:
-        return refined_piece(surface, groups[number], sources[number], total, config, late)
-
-    found = parallel_map(laid, order)
-    failed = [number for number, of_one in zip(order, found, strict=True) if not of_one]
+    found = parallel_map(lambda group: refined_piece(surface, group, total, config, late), groups)
+    failed = [group for group, of_one in zip(groups, found, strict=True) if not of_one]
     if late() and failed:
-        left = np.sort(np.concatenate([groups[number] for number in failed]))
+        left = np.sort(np.concatenate([group.ids for group in failed]))
         found.append(projected(surface, left, total, config.project))
         failed = []
     anew = State(surface, graph, config) if failed else None
     if anew is not None:
-        anew.add_all_valid([(groups[number], sources[number].slits) for number in failed])
+        anew.add_all_valid([(group.ids, group.source.slits) for group in failed])
     charts = [of_one[0] for of_one in found if of_one] + ([] if anew is None else list(anew.pieces.values()))
     return scraps_given(surface, charts, [scrap for of_one in found for scrap in of_one[1:]], config, late)
 
 
-def carried_groups(
-    surface: Surface, graph: DualGraph, middle: Surface, pieces: list[Piece], config: FinishConfig, late: Late
-) -> tuple[list[NDArray[np.int64]], list[Piece]]:
-    """Connected faces of the surface, group by group, and the piece of the middle mesh that each is laid out like."""
-    label = np.zeros(len(middle.faces), dtype=np.int64)
-    for number, piece in enumerate(pieces):
-        label[piece.ids] = number
-    areas = surface.face_areas()
-    if late() and len(surface.faces) * len(pieces) > config.fine.hurried.weighed:
-        smooth = labels_at_once(middle, label, surface, graph, config.carry)
-        joined = crumbs_given(smooth, areas, graph, config.carry.islet)
-    else:
-        smooth = smoothed_in_band(votes(middle, label, surface, config.carry), areas, graph, config)
-        joined = fragments_joined(smooth, areas, graph, config.carry.islet)
-    groups = np.split(np.argsort(joined, kind="stable"), np.cumsum(np.bincount(joined))[:-1])
-    return groups, [pieces[int(np.bincount(smooth[ids]).argmax())] for ids in groups]
-
-
 def refined_piece(
-    surface: Surface, ids: NDArray[np.int64], source: Piece, total: float, config: FinishConfig, late: Late = never
+    surface: Surface, group: Group, total: float, config: FinishConfig, late: Late = never
 ) -> list[Piece]:
-    """The faces ids (m,) laid out like their source, and what had to be cut off; empty where no way to is valid.
+    """The faces of a group laid out like their source, and what had to be cut off; empty where no way to is valid.
 
     It may be no worse than the source by more than the configured factor, unless it is ``late``.
     """
     if late():
         config = replace(config, fine=config.fine.in_a_hurry())
+    ids, source, near = group
     whole = extract(surface, ids)
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []
     for disk in opened_alike(whole, source, config):
-        uv, wrong = laid_out(disk, source.flat, config)
+        uv, wrong = laid_out(disk, source.flat, config, near)
         found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config, late)
         if found and (not best or total_cost(found, config) < total_cost(best, config)):
             best = found
@@ -148,7 +126,9 @@ def without_folds(
         part = components(flat.surface.faces[~off])
         rows = np.flatnonzero(~off)[part == np.bincount(part).argmax()]
         rest = restricted(flat, rows)
-    off = ids[np.setdiff1d(np.arange(len(ids)), rows)]
+    left = np.ones(len(ids), dtype=bool)
+    left[rows] = False
+    off = ids[left]
     flaps = projected(surface, off, total, config.project) if late() else flaps_apart(surface, off, total, config)
     return [measured(surface, ids[rows], rest, total, ()), *flaps]
 
@@ -193,13 +173,16 @@ def opened_alike(whole: Surface, source: Piece, config: FinishConfig) -> Iterato
     yield from others
 
 
-def laid_out(disk: Surface, source: Flat, config: FinishConfig) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def laid_out(
+    disk: Surface, source: Flat, config: FinishConfig, near: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Uv (v, 2) of an opened piece, like its source's, and the faces (f,) bool that are flipped or overlap there.
 
     First with the source's stretch, contacts and all, then as rigid as it may become without overlap.
+    near: as `faces_beside` takes it.
     """
     fine, faces = config.fine, disk.faces
-    nearest = faces_beside(disk, source, config)
+    nearest = faces_beside(disk, source, config, near)
     coarse = weights_of(disk, source.surface, nearest)
     solver = partial(solver_with, coarse, fine.tolerance, fine.solver_steps)
     rim = rim_faces(faces, boundary_edges(faces))

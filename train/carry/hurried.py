@@ -5,27 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..search.labels import connected_pieces, contracted
-from .layout import features
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.mesh import Surface
-    from ..config import CarryConfig
     from ..search.labels import DualGraph
 
 NOTHING = -1
-
-
-def labels_at_once(
-    coarse: Surface, label: NDArray[np.int64], surface: Surface, graph: DualGraph, config: CarryConfig
-) -> NDArray[np.int64]:
-    """(f,) the label (c,) of the nearest face of the proxy, then, for some rounds, that of most neighbours."""
-    nearest = KDTree(features(coarse, config)).query(features(surface, config), workers=-1)[1]
-    return followed(label[nearest], graph, config.hurried_rounds)
 
 
 def followed(label: NDArray[np.int64], graph: DualGraph, rounds: int) -> NDArray[np.int64]:

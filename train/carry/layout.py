@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import KDTree
 
+from ...runtime.cores import core_count
 from ..finish.arap import RigidSteps, nearest_rotations
 from ..finish.flatten import jacobians
+
+MANY = 50_000
+"""Faces from which on several threads look for what is near; what they find is the same."""
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +49,14 @@ def carried_uv(disk: Surface, source: Flat, config: CarryConfig) -> NDArray[np.f
 
 def nearest_faces(disk: Surface, proxy: Surface, config: CarryConfig) -> NDArray[np.int64]:
     """(f,) the face of the proxy that lies nearest to each face, by position and normal."""
-    return np.asarray(KDTree(features(proxy, config)).query(features(disk, config))[1], dtype=np.int64)
+    return near_faces(disk, proxy, config, 1)[:, 0]
+
+
+def near_faces(surface: Surface, proxy: Surface, config: CarryConfig, count: int) -> NDArray[np.int64]:
+    """(f, count) the faces of the proxy that lie nearest to each face, the nearest first."""
+    workers = core_count() if len(surface.faces) >= MANY else 1
+    found = KDTree(features(proxy, config)).query(features(surface, config), k=count, workers=workers)[1]
+    return np.asarray(found, dtype=np.int64).reshape(len(surface.faces), count)
 
 
 def carried_jacobians(disk: Surface, source: Flat, nearest: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...runtime.geometry.topology import edge_table
+from ...runtime.mesh import Surface
 from ..finish.contact import boundary_edges
 from ..finish.flatten import jacobians
 from .layout import face_frames, features, nearest_faces
@@ -19,7 +20,6 @@ from .layout import face_frames, features, nearest_faces
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.mesh import Surface
     from ..config import FinishConfig
     from ..finish.slits import Flat
 
@@ -37,9 +37,18 @@ class CoarseMap:
         return self.uv[face] + np.einsum("...ij,...j->...i", self.slope[face], points - self.place[face])
 
 
-def faces_beside(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.int64]:
-    """(f,) the coarse face that answers for each face of a piece opened like it."""
-    chosen = nearest_faces(disk, source.surface, config.carry)
+def faces_beside(
+    disk: Surface, source: Flat, config: FinishConfig, near: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """(f,) the coarse face that answers for each face of a piece opened like it.
+
+    near: (f,) the nearest coarse face of each, where that is known, else −1.
+    """
+    chosen = np.full(len(disk.faces), -1) if near is None else near.copy()
+    unknown = chosen < 0
+    if unknown.any():
+        part = Surface(disk.vertices, disk.faces[unknown])
+        chosen[unknown] = nearest_faces(part, source.surface, config.carry)
     on_rim = np.zeros(len(source.surface.vertices), dtype=bool)
     on_rim[boundary_edges(source.surface.faces)] = True
     rim = np.flatnonzero(on_rim[source.surface.faces[chosen]].any(axis=1))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
+from ...runtime.geometry.rows import by_first_appearance, first_of_each
+from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices, stable_order
 from ...runtime.mesh import Surface
 
 if TYPE_CHECKING:
@@ -41,37 +42,40 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
         tolerance: distance, as a share of the part's size, up to which the vertices of a copy coincide.
     """
     faces, old = split_non_manifold_vertices(surface.faces)
-    table = edge_table(faces)
+    vertices, table = surface.vertices[old], edge_table(faces)
     component = face_components(len(faces), table.edge_faces[table.manifold])
-    order = np.argsort(component, kind="stable")
-    groups = np.split(order, np.cumsum(np.bincount(component))[:-1])
+    order = stable_order(component, len(faces))
+    size = np.bincount(component)
+    twins = np.bincount(size)  # by number of faces: parts that have so many
     parts: list[Part] = []
     known: dict[bytes, list[int]] = {}
-    for ids in groups:
-        part = extracted(surface.vertices[old], faces, ids)
-        for mirrored in (False, True):
-            key = pattern(part.surface.faces, mirrored=mirrored)
-            same = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
-            if same >= 0:
-                part = part._replace(copy_of=same, mirrored=mirrored)
-                break
-        if part.copy_of < 0:
-            known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(len(parts))
+    for ids in np.split(order, np.cumsum(size)[:-1]):
+        part = extracted(vertices, faces, ids)
+        if twins[len(ids)] > 1:
+            part = compared(part, parts, known, tolerance)
         parts.append(part)
     return parts
+
+
+def compared(part: Part, parts: list[Part], known: dict[bytes, list[int]], tolerance: float) -> Part:
+    """A part, named a copy where it is one of those before it.  known: numbers of those that are none, by pattern."""
+    for mirrored in (False, True):
+        key = pattern(part.surface.faces, mirrored=mirrored)
+        same = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
+        if same >= 0:
+            return part._replace(copy_of=same, mirrored=mirrored)
+    known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(len(parts))
+    return part
 
 
 def extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], ids: NDArray[np.int64]) -> Part:
     """Faces ids (m,) as a surface of area 1 around its mean, its vertices numbered as its faces first name them."""
     corner = faces[ids].reshape(-1)
-    used, first, index = np.unique(corner, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.zeros(len(used), dtype=np.int64)
-    rank[order] = np.arange(len(used))
-    points = vertices[used[order]]
+    number = named(corner)
+    points = vertices[corner[first_of_each(number)]]
     origin = points.mean(axis=0)
     points = points - origin
-    renumbered = rank[index].reshape(-1, 3)
+    renumbered = number.reshape(-1, 3)
     area = float(Surface(points, renumbered).face_areas().sum())
     extent = float(np.ptp(points, axis=0).max())
     scale = float(np.sqrt(area)) if area > 0.0 else (extent or 1.0)
@@ -81,12 +85,16 @@ def extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], ids: NDAr
 def pattern(faces: NDArray[np.int64], *, mirrored: bool) -> bytes:
     """The connectivity of a part whose vertices are numbered as faces name them; of its mirror image where asked."""
     if mirrored:
-        turned = faces[:, [0, 2, 1]].reshape(-1)
-        used, first, index = np.unique(turned, return_index=True, return_inverse=True)
-        rank = np.zeros(len(used), dtype=np.int64)
-        rank[np.argsort(first)] = np.arange(len(used))
-        faces = rank[index].reshape(-1, 3)
+        faces = named(faces[:, [0, 2, 1]].reshape(-1)).reshape(-1, 3)
     return faces.astype(np.int32).tobytes()
+
+
+def named(corner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Vertices (n,) numbered as they are first named; where they are few among many, in the time that few take."""
+    least = int(corner.min())
+    if int(corner.max()) - least > 4 * len(corner):
+        corner, least = np.unique(corner, return_inverse=True)[1].reshape(-1), 0
+    return by_first_appearance(corner - least)
 
 
 def is_copy(first: Part, second: Part, tolerance: float, *, mirrored: bool) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.geometry.topology import edge_table
+from ...runtime.geometry.triangles import triangle_normals
 from ..sampling import sample_surface, samples_in_faces
 from .experts import Lesson
 
@@ -43,11 +44,12 @@ class Seams(NamedTuple):
 def lesson_of(surface: Surface, charts: Charts, config: SampleConfig, rng: np.random.Generator) -> Lesson:
     """Uv and chart at samples of a surface in the unit ball."""
     face, barycentric, plane = spots_on(surface, charts, config, rng)
+    corners, uv = surface.vertices[surface.faces[face]], charts.corner_uv[face]
     return Lesson(
-        x=np.einsum("nc,ncd->nd", barycentric, surface.triangles[face]),
-        y=np.einsum("nc,ncd->nd", barycentric, charts.corner_uv[face]),
+        x=np.einsum("nc,ncd->nd", barycentric, corners),
+        y=np.einsum("nc,ncd->nd", barycentric, uv),
         label=charts.face_chart[face],
-        slope=face_slopes(surface.triangles, charts.corner_uv)[face],
+        slope=face_slopes(corners, uv),
         plane=plane,
     )
 
@@ -84,10 +86,10 @@ def seams_of(surface: Surface, charts: Charts) -> Seams:
     torn = (start[:, 0] != end[:, 1]).any(axis=1) | (end[:, 0] != start[:, 1]).any(axis=1)
     half = half[torn | (charts.face_chart[face[:, 0]] != charts.face_chart[face[:, 1]])]
     face, corner = half // 3, half[:, 0] % 3
-    first = surface.triangles[face[:, 0]]
+    first = surface.vertices[surface.faces[face[:, 0]]]
     row = np.arange(len(half))
     origin, along = first[row, corner], first[row, (corner + 1) % 3] - first[row, corner]
-    normal = np.cross(along, surface.face_normals()[face].sum(axis=1))
+    normal = np.cross(along, triangle_normals(surface.vertices[surface.faces[face]]).sum(axis=1))
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, size, out=np.full_like(normal, np.nan), where=size > 0.0)
     plane = np.concatenate([normal, -np.einsum("sd,sd->s", normal, origin)[:, None]], axis=1)

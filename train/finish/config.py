@@ -84,6 +84,8 @@ class SlitConfig:
     """Ways to the same vertex that are tried."""
     astray: float = 3.0
     """Distance from its end to the nearest vertex, in steps of its own points, from which a slit lies elsewhere."""
+    reach: float = 12.0
+    """How far from a slit, in steps of its own points, the way that follows it on another mesh is sought."""
     apart: float = 0.6
     """How far from the first way's start the second must start, as a share of its length."""
     failures: int = 3

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.geometry.cutgraph import SeamPrices
-    from ...runtime.geometry.topology import EdgeTable
     from .config import SlitConfig
 
 
@@ -52,21 +51,80 @@ def slit_along(surface: Surface, slits: tuple[Slit, ...], config: SlitConfig) ->
 
     A slit that lies elsewhere, or would cut the piece in two, is left out.
     """
+    if not slits:
+        return surface
+    table = edge_table(surface.faces)
+    work = Slitting(surface, np.zeros(len(surface.vertices), dtype=bool))
+    work.border[table.edges[table.edge_count == 1]] = True
     for slit in slits:
-        table = edge_table(surface.faces)
-        path = path_along(surface, table, slit, config)
+        path = path_along(work, slit, config)
         if len(path) < 2:
             continue
-        faces, old = cut_open(surface.faces, path_mask(table, [path]), table)
-        if not slit.through or not components(faces).any():
-            surface = Surface(surface.vertices[old], faces)
-    return surface
+        trial = work.cut(path)
+        if not slit.through or not components(trial.surface.faces).any():
+            work = trial
+    return work.surface
 
 
-def path_along(surface: Surface, table: EdgeTable, slit: Slit, config: SlitConfig) -> list[int]:
+class Slitting(NamedTuple):
+    """A piece on its way to be slit.  border: (v,) bool, vertices on it.
+
+    On a fine mesh a slit is short: what does not lie near it is only numbered anew.
+    """
+
+    surface: Surface
+    border: NDArray[np.bool_]
+
+    def around(self, slit: Slit, reach: float) -> NDArray[np.int64]:
+        """Faces with a corner in the box around a slit, so far wider on all sides."""
+        lowest, highest = slit.points.min(axis=0) - reach, slit.points.max(axis=0) + reach
+        points = self.surface.vertices
+        return self.touching(((points >= lowest) & (points <= highest)).all(axis=1))
+
+    def touching(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Faces with a corner among the chosen (v,)."""
+        faces = self.surface.faces
+        return np.flatnonzero(chosen[faces[:, 0]] | chosen[faces[:, 1]] | chosen[faces[:, 2]])
+
+    def cut(self, path: list[int]) -> Slitting:
+        """The piece cut along a path of vertices, as ``cut_open`` does it; only faces around the path are looked at."""
+        count, on_path = len(self.surface.vertices), np.zeros(len(self.surface.vertices), dtype=bool)
+        on_path[path] = True
+        rows = self.touching(on_path)
+        near = self.surface.faces[rows]
+        table = edge_table(near)
+        split, old = cut_open(near, path_mask(table, [path]), table)
+        whole = on_path[near]  # corners whose fans are all there
+        fan = np.arange(len(old)) - np.searchsorted(old, old)  # of each vertex the first, the second, …
+        copies = np.ones(count, dtype=np.int64)
+        np.maximum.at(copies, old[on_path[old]], fan[on_path[old]] + 1)
+        first = np.cumsum(copies) - copies
+        faces = first[self.surface.faces]
+        faces[rows] += np.where(whole, fan[split], 0)
+        source = np.repeat(np.arange(count), copies)
+        border, table = self.border[source], edge_table(faces[rows])
+        rim = table.edges[table.edge_count == 1]
+        border[rim[on_path[source[rim]].any(axis=1)]] = True
+        return Slitting(Surface(self.surface.vertices[source], faces), border)
+
+
+def path_along(work: Slitting, slit: Slit, config: SlitConfig) -> list[int]:
     """The cheapest way between a slit's ends, from the inner one to the border; fewer than two vertices for none."""
-    points = surface.vertices
-    border = np.unique(table.edges[table.edge_count == 1])
+    for reach in (config.reach * slit.step, np.inf):
+        rows = work.around(slit, reach)
+        vertex, index = np.unique(work.surface.faces[rows], return_inverse=True)
+        border = np.flatnonzero(work.border[vertex])
+        if len(border) or (len(rows) and not work.border.any()):
+            near = Surface(work.surface.vertices[vertex], index.reshape(-1, 3))
+            path = way_along(near, border, slit, config)
+            if len(path) > 1:
+                return vertex[path].tolist()
+    return []
+
+
+def way_along(surface: Surface, border: NDArray[np.int64], slit: Slit, config: SlitConfig) -> list[int]:
+    """The same among the faces near a slit; border: those of their vertices that lie on the piece's."""
+    points, table = surface.vertices, edge_table(surface.faces)
     begin = np.linalg.norm(points - slit.points[0], axis=1)
     end = np.linalg.norm(points - slit.points[-1], axis=1)
     beginnings = border if len(border) else np.arange(len(points))

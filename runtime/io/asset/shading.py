@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...geometry.creases import fan_normals
-from ...geometry.rows import equal_rows, first_of_each
+from ...geometry.rows import equal_rows, first_places
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,10 +46,16 @@ def with_corner_normals(asset: Asset, normals: NDArray[np.float64]) -> Asset:
     steps = np.rint(rows / ALIKE).astype(np.int64)
     corner = np.zeros(len(asset.positions), dtype=np.int64)
     corner[vertex] = np.arange(len(vertex))
-    if (steps == steps[corner[vertex]]).all():
+    alike = (steps == steps[corner[vertex]]).all(axis=1)
+    if alike.all():
         return replace(asset, normals=rows[corner])
-    piece = equal_rows(np.column_stack([vertex, steps]))
-    first = first_of_each(piece)
+    creased = np.zeros(len(corner), dtype=bool)
+    creased[vertex[~alike]] = True
+    several, piece = np.flatnonzero(creased[vertex]), vertex.copy()
+    piece[several] = len(corner) + equal_rows(np.column_stack([vertex, steps])[several])
+    first = first_places(piece)
+    used = first < len(piece)
+    piece, first = (np.cumsum(used) - 1)[piece], first[used]
     chosen = vertex[first]
     later = np.ones(len(first), dtype=np.bool_)
     later[np.unique(chosen, return_index=True)[1]] = False

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...errors import MeshError
 from ...geometry.normals import smooth_normals
-from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
+from ...geometry.rows import by_first_appearance, compacted, equal_rows, first_of_each
+from ...geometry.topology import vertices_used
 from ...mesh import Asset, Surface
 from ..rawmesh import RawMesh, check, with_vertices
 from .orient import connected_labels, face_edges, inconsistent_faces
@@ -30,8 +31,7 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
     Raises: MeshError for a mesh that is empty, not finite, out of range, too large, or degenerate in all its faces.
     """
     check(raw)
-    used, faces = np.unique(raw.faces, return_inverse=True)
-    part = with_vertices(raw, used, faces.reshape(-1, 3))
+    part = with_vertices(raw, *compacted(raw.faces))
     weld = weld_vertices(part.positions, part.faces, part.body)
     proper = ~degenerate_faces(part.positions[first_of_each(weld)], weld[part.faces])
     if not proper.any():
@@ -39,13 +39,13 @@ def clean(raw: RawMesh, *, stem: str = "mesh", sha256: str = "") -> Asset:
             f"all {len(proper)} faces are degenerate (repeated corners, no area), expected triangles; export it again"
         )
     kept = np.flatnonzero(proper)
-    welded = np.unique(weld[part.faces[kept]], return_inverse=True)[1].reshape(-1, 3)
+    welded = compacted(weld[part.faces[kept]])[1]
     twin = twins(welded)
     lies_on = np.bincount(twin)[twin] > 1
     sheets = separate_sheets(welded, twin)[0] if lies_on.any() else welded
     flip = inconsistent_faces(sheets)
     counts = {
-        "unreferenced_vertices": len(raw.positions) - len(np.unique(part.faces[kept])),
+        "unreferenced_vertices": len(raw.positions) - vertices_used(part.faces[kept]),
         "welded_vertices": len(weld) - len(first_of_each(weld)),
         "degenerate_faces": int(np.count_nonzero(~proper)),
         "coincident_faces": int(np.count_nonzero(lies_on)),
@@ -106,6 +106,12 @@ def _split_at_sheets(raw: RawMesh, sheets: NDArray[np.int64]) -> tuple[RawMesh, 
 
     A file vertex that belongs to several sheets is split: the first stays in its place, the others go to the end.
     """
+    sheet = np.full(len(raw.positions), -1)
+    sheet[raw.faces] = sheets
+    if np.array_equal(sheet[raw.faces], sheets):  # as nearly always: none is split
+        used = np.flatnonzero(sheet >= 0)
+        number = np.cumsum(sheet >= 0) - 1
+        return with_vertices(raw, used, number[raw.faces]), by_first_appearance(sheet[used])
     pair = equal_rows(np.stack([raw.faces.ravel(), sheets.ravel()], axis=1))
     first = first_of_each(pair)
     vertex = raw.faces.ravel()[first]

@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from ...geometry.rows import by_first_appearance
+from ...geometry.topology import stable_order
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,8 +37,10 @@ def face_edges(faces: NDArray[np.int64]) -> FaceEdges:
     """Which of faces (f, 3) share an edge, and how."""
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     low, high = np.minimum(tail, head), np.maximum(tail, head)
-    order = np.lexsort((high, low))
-    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+    span = int(high.max(initial=0)) + 1
+    key = low * span + high
+    order = stable_order(key, span * span)
+    same = np.diff(key[order]) == 0
     face, forward = order // 3, (tail < head)[order]
     before = np.concatenate([[False], same[:-1]])
     after = np.concatenate([same[1:], [False]])

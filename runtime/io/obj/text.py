@@ -5,16 +5,19 @@ A statement is a line, those joined by a backslash at the end being one.  v, vt,
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..text import lines_of
+from .plain import ODD
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
 NAMING = ("o", "g", "s")
@@ -52,13 +55,18 @@ class ObjText:
                 found[number], waiting = waiting, ""
         return found
 
+    @cached_property
+    def beyond(self) -> Counter[str]:
+        """How many statements there are of each keyword; of a plain file without those of v and f."""
+        others = besides_tables(self.data)
+        return Counter(keyword(line) for line in (self.statements.values() if others is None else others))
+
     def beyond_meshes(self) -> dict[str, int]:
         """What other formats have no word for: named objects and groups, smoothing groups, lines and points."""
-        kinds = [keyword(statement) for statement in self.statements.values()]
         counts = {
-            "skipped_names": sum(kind in NAMING for kind in kinds),
-            "skipped_lines": kinds.count("l"),
-            "skipped_points": kinds.count("p"),
+            "skipped_names": sum(self.beyond[kind] for kind in NAMING),
+            "skipped_lines": self.beyond["l"],
+            "skipped_points": self.beyond["p"],
         }
         return {name: count for name, count in counts.items() if count}
 
@@ -66,6 +74,17 @@ class ObjText:
         """How many pictures its materials name that none of the maps baked takes the place of."""
         baked = {PICTURES[name].lower() for name in maps if name in PICTURES}
         return sum(is_picture(line) and keyword(line) not in baked for line in self.materials.split("\n"))
+
+
+def besides_tables(data: bytes) -> list[str] | None:
+    """The lines that begin with neither v nor f; None where lines may be joined, or end otherwise than most do."""
+    if any(odd in data for odd in ODD) or data.count(b"\r") != data.count(b"\r\n") or not data.isascii():
+        return None
+    letters = np.frombuffer(data + b"\n", dtype=np.uint8)
+    end = np.flatnonzero(letters == ord("\n"))
+    start = np.concatenate([[0], end[:-1] + 1])
+    others = np.flatnonzero(~np.isin(letters[start], list(b"vVfF\n")))
+    return [data[first:last].decode() for first, last in zip(start[others].tolist(), end[others].tolist(), strict=True)]
 
 
 def keyword(line: str) -> str:

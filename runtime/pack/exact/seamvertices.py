@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...geometry.normals import smooth_normals
+from ...geometry.rows import first_places
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,14 +32,26 @@ def split_vertices(
         (f, 3) int64 faces over atlas vertices, (a,) int64 the file vertex of each, ascending, and (a, 2) float64 uv.
     """
     vertex, chart, uv = faces.reshape(-1), np.repeat(face_chart, 3), corner_uv.reshape(-1, 2)
-    order = np.lexsort((uv[:, 1], uv[:, 0], chart, vertex))
+    found = first_places(vertex)
+    copies = (found < len(vertex)).astype(np.int64)  # of each file vertex; most have one
+    like = found[vertex]
+    split = np.zeros(len(found), dtype=bool)
+    split[vertex[(chart != chart[like]) | (uv != uv[like]).any(axis=1)]] = True
+    rows = np.flatnonzero(split[vertex])
+    order = rows[np.lexsort((uv[rows, 1], uv[rows, 0], chart[rows], vertex[rows]))]
     fresh = np.ones(len(order), dtype=bool)
     fresh[1:] = (vertex[order][1:] != vertex[order][:-1]) | (chart[order][1:] != chart[order][:-1])
     fresh[1:] |= (uv[order][1:] != uv[order][:-1]).any(axis=1)
-    of_corner = np.zeros(len(order), dtype=np.int64)
-    of_corner[order] = np.cumsum(fresh) - 1
-    first = order[fresh]
-    return of_corner.reshape(-1, 3), vertex[first], uv[first]
+    seam = order[fresh]
+    copies[split] = np.bincount(vertex[seam], minlength=len(found))[split]
+    before = np.cumsum(copies) - copies
+    of_corner = before[vertex]
+    number = np.cumsum(fresh) - 1
+    of_corner[order] += number - np.searchsorted(vertex[seam], vertex[order])
+    source = np.repeat(np.arange(len(found)), copies)
+    first = found[source]
+    first[of_corner[seam]] = seam
+    return of_corner.reshape(-1, 3), source, uv[first]
 
 
 def atlas_normals(asset: Asset, source_vertex: NDArray[np.int64]) -> NDArray[np.float32]:

@@ -21,7 +21,7 @@ from flexpara.train.carry.carry import (
     votes,
     within_reach,
 )
-from flexpara.train.carry.layout import carried_uv, face_frames, turned_into
+from flexpara.train.carry.layout import carried_uv, face_frames, near_faces, nearest_faces, turned_into
 from flexpara.train.carry.proxy import simplified
 from flexpara.train.config import CarryConfig, FinishConfig
 from flexpara.train.finish.contact import excess_energy
@@ -52,13 +52,13 @@ def test_labels_of_the_surface_itself_come_back_as_they_are() -> None:
     sphere = sample("sphere", 24)
     label = np.random.default_rng(0).integers(0, 4, len(sphere.faces))
     label[:4] = np.arange(4)
-    share = votes(sphere, label, sphere, CarryConfig(neighbours=1))
+    share = votes(label[near_faces(sphere, sphere, CARRY, 1)])
     assert np.array_equal(share, np.eye(4)[label])
 
 
 def test_shares_are_a_partition() -> None:
     sphere, proxy = sample("sphere", 24), sample("sphere", 12)
-    share = votes(proxy, np.arange(len(proxy.faces)) % 5, sphere, CARRY)
+    share = votes(near_faces(sphere, proxy, CARRY, CARRY.neighbours) % 5)
     assert share.shape == (len(sphere.faces), 5)
     assert share.sum(axis=1) == pytest.approx(1.0)
     assert (share >= 0.0).all()
@@ -67,7 +67,8 @@ def test_shares_are_a_partition() -> None:
 def test_two_colours_of_a_sphere_come_back_right() -> None:
     sphere = sample("sphere", 96)
     proxy = simplified(sphere, 1000)
-    share = votes(proxy, (proxy.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64), sphere, CARRY)
+    upper = (proxy.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64)
+    share = votes(upper[near_faces(sphere, proxy, CARRY, CARRY.neighbours)])
     height = sphere.triangles.mean(axis=1)[:, 2]
     clear = np.abs(height) > 0.1
     assert np.array_equal(share.argmax(axis=1)[clear], (height[clear] > 0.0).astype(np.int64))
@@ -80,8 +81,7 @@ def test_the_normal_tells_the_two_sides_of_a_thin_plate_apart() -> None:
     shifted = Surface(plate.vertices - [0.0, 0.0, 0.004], plate.faces)  # as simplification may move a sheet
     faces = np.abs(plate.face_normals()[:, 2]) > 0.5
     seeing, blind = (
-        votes(plate, label, shifted, CarryConfig(neighbours=1, normal_weight=weight)).argmax(axis=1)[faces]
-        for weight in (0.1, 0.0)
+        label[nearest_faces(shifted, plate, CarryConfig(normal_weight=weight))][faces] for weight in (0.1, 0.0)
     )
     assert np.array_equal(seeing, label[faces])
     assert (blind != label[faces]).mean() > 0.3  # without normals it can't

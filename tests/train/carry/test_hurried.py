@@ -10,7 +10,8 @@ pytest.importorskip("igl")
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.carry.hurried import crumbs_given, followed, labels_at_once
+from flexpara.train.carry.hurried import crumbs_given, followed
+from flexpara.train.carry.layout import nearest_faces
 from flexpara.train.config import FinishConfig
 from flexpara.train.search.labels import DualGraph, connected_pieces, dual_graph
 
@@ -44,7 +45,7 @@ def test_two_halves_of_a_ball_stay_two_connected_halves() -> None:
     coarse, _ = sphere(8)
     fine, graph = sphere(32)
     label = (coarse.triangles.mean(axis=1)[:, 2] > 0.0).astype(np.int64)
-    found = labels_at_once(coarse, label, fine, graph, CONFIG.carry)
+    found = followed(label[nearest_faces(fine, coarse, CONFIG.carry)], graph, CONFIG.carry.hurried_rounds)
     up = fine.triangles.mean(axis=1)[:, 2] > 0.0
     assert (found == up).mean() > 0.9
     joined = crumbs_given(found, fine.face_areas(), graph, CONFIG.carry.islet)

@@ -109,3 +109,29 @@ def test_a_slit_that_would_run_along_the_border_leaves_it_where_it_must() -> Non
     assert euler_characteristic(slit.faces) == 1
     assert components(slit.faces).max() == 0
     assert border_length(ribbon) < border_length(slit) < border_length(ribbon) + 2.0 * 1.9
+
+
+@pytest.mark.parametrize("name", ["tube", "torus", "cloth"])
+def test_a_slit_is_the_same_whether_it_is_sought_near_by_or_everywhere(name: str) -> None:
+    coarse, fine = sample(name, 12), sample(name, 48)
+    *_, opening = openings(coarse, SeamPrices())
+    middle = coarse.vertices[np.linalg.norm(coarse.vertices - coarse.vertices.mean(axis=0), axis=1).argmin()]
+    rim = opening.disk.vertices[boundary_loops(opening.disk.faces)[0][0]]
+    short = Slit(np.linspace(rim, rim + 0.4 * (middle - rim), 5))
+    slits = (*opening.cuts, short)
+    found, expected = (slit_along(fine, slits, SlitConfig(reach=reach)) for reach in (12.0, np.inf))
+    assert border_length(found) > border_length(fine)
+    np.testing.assert_array_equal(found.faces, expected.faces)
+    np.testing.assert_array_equal(found.vertices, expected.vertices)
+
+
+def test_where_nothing_near_a_slit_leads_to_its_end_all_of_the_piece_is_looked_at() -> None:
+    """A ribbon bent to a hairpin: the slit crosses the gap between its arms, the way goes round the bend."""
+    flat = flat_sheet(48)
+    turn = np.pi * (flat.vertices[:, 0] + 1.0) / 2.0
+    radius = 1.0 + 0.3 * flat.vertices[:, 1]
+    hairpin = Surface(np.stack([radius * np.cos(turn), 3.0 * radius * np.sin(turn), 0.0 * turn], axis=1), flat.faces)
+    ends = [int(np.abs(flat.vertices - place).sum(axis=1).argmin()) for place in ([-1.0, 0, 0], [0.9, 0, 0])]
+    slit = Slit(np.linspace(hairpin.vertices[ends[0]], hairpin.vertices[ends[1]], 120))
+    found = slit_along(hairpin, (slit,), SlitConfig(astray=50.0))
+    assert border_length(found) > border_length(hairpin) + 0.1
