@@ -7,6 +7,7 @@ Positions in source units, uv in [0, 1]² of the atlas, sizes in texels.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from ..train.charts.recut import recut
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.polygons import whole_polygons
+from ..train.workers import Beside
 from .deploy.onnxfile import export_networks
 from .graph.metadata import PlacedCharts, Provenance
 
@@ -65,10 +67,12 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
     Raises: ParityError when the exported file and its networks disagree.
     """
     with clock.stage("pack"):
-        trained, packed = _valid_atlas(asset, trained, clock, square)
+        trained, packed = _valid_atlas(asset, trained, square)
     atlas, size = packed.atlas, square.size
     with clock.stage("measure"):
         metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size, stack=atlas.face_stack)
+    with clock.stage("fit"):  # what is left of it
+        networks = trained.networks
     report: dict[str, Any] = {
         "format_version": REPORT_VERSION,
         "version": __version__,
@@ -78,51 +82,55 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
         "pack": packed.report,
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),
-        "train": trained.report,
+        "train": {**trained.report, "experts": len(networks.label)},
     }
     with clock.stage("export"), TemporaryDirectory() as folder:
         path, placed = Path(folder) / "atlas.onnx", PlacedCharts(trained.frame, atlas, trained.charts)
         facts = Provenance(asset.sha256, report["settings"], report["metrics"])
-        parity = export_networks(trained.networks, placed, path, metadata=facts)
+        parity = export_networks(networks, placed, path, metadata=facts)
         network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
         paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, size, facts)
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = clock.rounded
-    return Unwrapped(trained.charts, trained.frame, atlas, trained.networks, onnx, report, paper)
+    return Unwrapped(trained.charts, trained.frame, atlas, networks, onnx, report, paper)
 
 
-def _with_whole_polygons(asset: Asset, trained: Trained, clock: Clock) -> Trained:
+def _with_whole_polygons(asset: Asset, trained: Trained) -> Trained:
     """Seams off the diagonals of polygons, where there is room, and the networks of these charts."""
     if asset.polygons is None or trained.paper is not None:
         return trained
     charts = whole_polygons(asset.surface, trained.charts, asset.polygons)
     if charts is trained.charts:
         return trained
+    return _with_charts(asset, trained, charts)
+
+
+def _with_charts(asset: Asset, trained: Trained, charts: Charts) -> Trained:
+    """The same with other charts, and networks that are fitted to these."""
+    trained.fitted.end()
     ball = Surface(trained.frame.apply(asset.surface.vertices), asset.surface.faces)
-    networks = fit_networks(ball, charts, fit_in_force(trained.settings), trained.settings["seed"], clock)
-    return replace(trained, charts=charts, networks=networks)
+    fit, seed = fit_in_force(trained.settings), trained.settings["seed"]
+    return replace(trained, charts=charts, fitted=Beside(partial(fit_networks, ball, charts, fit, seed)))
 
 
-def _valid_atlas(asset: Asset, trained: Trained, clock: Clock, square: Square) -> tuple[Trained, Packed]:
+def _valid_atlas(asset: Asset, trained: Trained, square: Square) -> tuple[Trained, Packed]:
     """Packed charts that are valid as written; those that float32 could not hold are cut again, and all fitted anew.
 
     Raises: FinishError where charts stay invalid (a defect).
     """
     seed, config = trained.settings["seed"], PackConfig()
-    trained = _with_whole_polygons(asset, trained, clock)
+    trained = _with_whole_polygons(asset, trained)
     packed = pack_asked(asset, trained.charts, square, seed, config)
     for _ in range(config.recuts):
         if len(packed.invalid) == 0:
             return trained, packed
         charts = recut(asset.surface, trained.charts, packed.invalid, packed.atlas.corner_uv)
-        ball = Surface(trained.frame.apply(asset.surface.vertices), asset.surface.faces)
-        networks = fit_networks(ball, charts, fit_in_force(trained.settings), seed, clock)
         note = (
             f"{len(packed.invalid)} charts lost triangles too thin for the numbers of a file: each is its own chart now"
         )
         report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
-        trained = replace(trained, charts=charts, networks=networks, report=report)
+        trained = _with_charts(asset, replace(trained, report=report), charts)
         packed = pack_asked(asset, charts, square, seed, config)
     if len(packed.invalid):
         raise FinishError(

@@ -6,6 +6,7 @@ f faces.  Charts are found once, over the whole mesh; pages share them out, and 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..runtime.pack.square import square_of
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force
 from ..train.presets import train_asset
+from ..train.workers import Beside
 from .assemble import Unwrapped, assemble
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ def assemble_pages(
 
     asset: with a document.  Raises: as `assemble`.
     """
+    trained.fitted.end()  # of all pages in one
     seed, fit = trained.settings["seed"], fit_in_force(trained.settings)
     with clock.stage("pack"):
         paged = pack_pages(asset, trained.charts, square, count, seed)
@@ -57,6 +60,6 @@ def assemble_pages(
         page = part_of(asset, own, f"{asset.stem}_{number + 1}")
         charts = some_charts(trained.charts, np.flatnonzero(own))
         ball = Surface(trained.frame.apply(page.surface.vertices), page.surface.faces)
-        networks = fit_networks(ball, charts, fit, seed, clock)
-        found.append((page, assemble(page, replace(trained, charts=charts, networks=networks), clock, even)))
+        fitted = Beside(partial(fit_networks, ball, charts, fit, seed))
+        found.append((page, assemble(page, replace(trained, charts=charts, fitted=fitted), clock, even)))
     return found

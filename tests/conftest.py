@@ -120,11 +120,11 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
 
     from flexpara.runtime.io.asset.wantedseams import NO_WISH, WantedSeams
     from flexpara.runtime.mesh import Charts, Frame, Surface
-    from flexpara.runtime.progress import Clock
     from flexpara.train import presets
     from flexpara.train.config import TrainConfig
     from flexpara.train.deploy.fit import fit_networks
     from flexpara.train.pipeline import Trained
+    from flexpara.train.workers import Beside
 
     trained: list[Surface] = []
 
@@ -144,7 +144,7 @@ def instant_training(monkeypatch: pytest.MonkeyPatch) -> list[Surface]:
         ball = Surface(frame.apply(surface.vertices), surface.faces)
         return Trained(
             charts=charts,
-            networks=fit_networks(ball, charts, settings.fit, settings.seed, Clock()),
+            fitted=Beside.known(fit_networks(ball, charts, settings.fit, settings.seed)),
             frame=frame,
             settings={"preset": "fast", **asdict(settings)},
             report={},

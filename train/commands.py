@@ -44,10 +44,14 @@ def train(
             from .presets import train_asset
             from .saved import to_bytes
         with console.progress() as progress:
-            trained = train_asset(asset, options, Clock(progress, Deadline(options.time_budget)))
+            clock = Clock(progress, Deadline(options.time_budget))
+            trained = train_asset(asset, options, clock)
+            with clock.stage("fit"):
+                experts = len(trained.networks.label)
         folder.write(name, lambda path: path.write_bytes(to_bytes(trained, asset.sha256)))
         source = {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)}
-        facts = {"version": __version__, "source": source, "settings": trained.settings, "train": trained.report}
+        report = {**trained.report, "experts": experts}
+        facts = {"version": __version__, "source": source, "settings": trained.settings, "train": report}
         folder.write_report(facts)
         written = folder.commit()
     console.notes(trained.report)

@@ -6,6 +6,7 @@ surface (source units) → unit ball → charts → fit.  Charts come back in so
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
 from .charts.charts import Finished, chart_surface, priced
 from .deploy.fit import fit_networks
+from .workers import Beside
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,18 +36,23 @@ if TYPE_CHECKING:
 class Trained:
     """Result of training.
 
-    charts: valid, in source units.  networks: unit ball (n, 3) → chart uv (n, 2) in source units, chart, score.
+    charts: valid, in source units.  fitted: the networks, which may still be on their way.
     frame: source units → unit ball.  settings: of the run; report: facts; both ready for JSON.  The sentences under
     "notes" of the report are shown to the user.
     paper: the networks of preset paper as they were trained: unit ball → logits (n, p), raw uv (n, p, 2); else None.
     """
 
     charts: Charts
-    networks: GatedExperts
+    fitted: Beside[GatedExperts]
     frame: Frame
     settings: dict[str, Any]
     report: dict[str, Any]
     paper: nn.Module | None = None
+
+    @property
+    def networks(self) -> GatedExperts:
+        """Unit ball (n, 3) → chart uv (n, 2) in source units, chart, score; waits until they are fitted."""
+        return self.fitted.result()
 
 
 def train(
@@ -74,26 +81,28 @@ def train(
     protected = None if wanted.protected is None else frame.apply(wanted.protected)
     finish = at_places(config.finish, ball, config.places, protected)
     finished = chart_surface(opened, config.charts, finish, config.seed, Stages(progress, deadline))
-    return with_networks(surface, finished, config, progress)
+    return with_networks(surface, finished, config)
 
 
-def with_networks(surface: Surface, finished: Finished, config: TrainConfig, progress: Progress) -> Trained:
-    """Charts of a surface (source units) that were finished in its unit ball, and the networks that answer for them."""
+def with_networks(surface: Surface, finished: Finished, config: TrainConfig) -> Trained:
+    """Charts of a surface (source units) that were finished in its unit ball, and the networks that answer for them.
+
+    These are fitted beside whatever comes next, which may be packing.
+    """
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
-    networks = fit_networks(ball, charts, config.fit, config.seed, progress)
+    fitted = Beside(partial(fit_networks, ball, charts, config.fit, config.seed))
     report = {
-        "experts": len(networks.label),
         "objective": finished.objective,
         "parts": finished.parts,
         "notes": list(finished.notes),
         "slit_length": sum(piece.slit_length for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
-    return Trained(charts, networks, frame, {"preset": "fast", **asdict(config)}, report)
+    return Trained(charts, fitted, frame, {"preset": "fast", **asdict(config)}, report)
 
 
 def at_places(

@@ -49,7 +49,7 @@ def train_asset(
         config = fast_config(options)
         with clock.stage("relax"):
             finished = kept_islands(asset, config.finish)
-        return with_networks(asset.surface, finished, config, clock)
+        return with_networks(asset.surface, finished, config)
     if options.preset != "paper":
         wanted = wanted_seams(asset, options, options.crease_angle)
         polygon = None if asset.polygons is None else asset.polygons.of_faces

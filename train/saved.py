@@ -18,6 +18,7 @@ from ..runtime.errors import InputError, MissingFileError
 from ..runtime.mesh import Charts, Frame
 from .deploy.gated import GatedExperts, Grid
 from .pipeline import Trained
+from .workers import Beside
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,7 +99,7 @@ def read_trained(path: Path, asset: Asset) -> Trained:
         raise _damaged(path, str(error)[:120]) from error
     if len(frame.centre) != 3 or not all(map(math.isfinite, (*frame.centre, frame.scale))) or frame.scale <= 0.0:
         raise _damaged(path, f"frame is {str(frame)[:120]}")
-    return Trained(charts, networks, frame, settings, report)
+    return Trained(charts, Beside.known(networks), frame, settings, report)
 
 
 def _read(path: Path, arrays: Arrays, kind: str, shapes: dict[str, tuple[int | None, ...]], types: Any) -> Arrays:

@@ -13,7 +13,7 @@ import signal
 import struct
 import sys
 import warnings
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -69,11 +69,63 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
         for copy in copies:
             done |= collected(copy)
     finally:
-        _sharing.clear()
+        _sharing.pop()
         os.close(tickets)
         for copy in copies:
             dismiss(copy)
     return [done[number] for number in range(len(items))]
+
+
+class Beside(Generic[Result]):
+    """One piece of work that a copy of this process does while the process itself goes on.
+
+    Where no core is free for it, it is done when its result is asked for, and not at all where nobody asks.
+    """
+
+    def __init__(self, work: Callable[[], Result]) -> None:
+        """``work``: as the function of ``parallel_map``; it shares nothing itself."""
+        self._work, self._found = work, list[Result]()
+        self._copy: Copy | None = None
+        self._process = os.getpid()
+        if available_cores() > 1 and not _sharing:
+            tickets = ticket_pipe(1)
+            self._copy = forked(lambda _: alone(work), [None], tickets)
+            os.close(tickets)
+
+    @classmethod
+    def known(cls, result: Result) -> Beside[Result]:
+        """Work that is done already."""
+        done = cls.__new__(cls)
+        done._work, done._found, done._copy = lambda: result, [result], None
+        return done
+
+    def result(self) -> Result:
+        """What the work gives.  Raises: what it raises; FinishError when the copy was killed."""
+        if not self._found:
+            try:
+                self._found.append(alone(self._work) if self._copy is None else collected(self._copy)[0])
+            finally:
+                self.end()
+        return self._found[0]
+
+    def end(self) -> None:
+        """Give the work up, unless it is done; copies of this process leave each other alone."""
+        copy, self._copy = self._copy, None
+        if copy is not None and self._process == os.getpid():
+            dismiss(copy)
+
+    def __del__(self) -> None:
+        self.end()
+
+
+def alone(work: Callable[[], Result]) -> Result:
+    """The result of work that is done with one thread, and shares nothing: beside others, or alone, the same."""
+    _sharing.append(True)
+    try:
+        with one_thread_each():
+            return work()
+    finally:
+        _sharing.pop()
 
 
 def available_cores() -> int:

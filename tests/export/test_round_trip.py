@@ -84,7 +84,7 @@ def both_ways(asset: Asset, charts: Charts, folder: Path) -> tuple[UnwrapSession
         """Progress that nobody watches."""
 
     placed = PlacedCharts(frame, atlas, charts)
-    export_networks(fit_networks(ball, charts, FitConfig(), 0, silence), placed, folder / "a.onnx")
+    export_networks(fit_networks(ball, charts, FitConfig(), 0), placed, folder / "a.onnx")
     inverse = fit_wrap(ball, charts, atlas.corner_uv, progress=silence)
     export_wrap(inverse, placed, folder / "a.wrap.onnx")
     return UnwrapSession(folder / "a.onnx"), WrapSession(folder / "a.wrap.onnx"), atlas, frame

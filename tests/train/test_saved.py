@@ -13,11 +13,11 @@ from safetensors import numpy as safetensors_numpy
 
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.mesh import Asset, Charts, Frame, Surface
-from flexpara.runtime.progress import Clock
 from flexpara.train.deploy.config import FitConfig
 from flexpara.train.deploy.fit import fit_networks
 from flexpara.train.pipeline import Trained
 from flexpara.train.saved import read_trained, to_bytes
+from flexpara.train.workers import Beside
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,7 +31,6 @@ NETWORKS = fit_networks(
     CHARTS,
     FitConfig(),
     0,
-    Clock(),
 )
 
 
@@ -40,7 +39,7 @@ def asset(sha256: str = "ab") -> Asset:
 
 
 def trained() -> Trained:
-    return Trained(CHARTS, NETWORKS, Frame.of(VERTICES), {"seed": 3}, {"experts": 2})
+    return Trained(CHARTS, Beside.known(NETWORKS), Frame.of(VERTICES), {"seed": 3}, {"experts": 2})
 
 
 @pytest.fixture

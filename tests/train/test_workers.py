@@ -11,7 +11,7 @@ import pytest
 
 from flexpara.runtime.errors import FinishError
 from flexpara.train import workers
-from flexpara.train.workers import parallel_map
+from flexpara.train.workers import Beside, parallel_map
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -72,6 +72,46 @@ def test_no_file_stays_open() -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
     parallel_map(abs, range(8))
     assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+@pytest.mark.usefixtures("cores")
+def test_work_beside_gives_its_result_once_and_leaves_nothing_behind() -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    work = Beside(lambda: np.arange(300_000))
+    assert work.result() is work.result()
+    assert work.result().sum() == 44_999_850_000
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@pytest.mark.usefixtures("cores")
+def test_what_work_beside_raises_is_raised_where_its_result_is_wanted() -> None:
+    work = Beside(lambda: seven_fails(7))
+    with pytest.raises(FinishError, match="seven"):
+        work.result()
+
+
+def test_work_beside_shares_nothing_and_this_process_goes_on_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "available_cores", lambda: 2)
+    work = Beside(lambda: parallel_map(slow_process_number, range(4)))
+    here = parallel_map(slow_process_number, range(4))
+    (there,) = set(work.result())
+    assert there not in here
+    assert len(set(here)) == 2
+
+
+@pytest.mark.usefixtures("cores")
+def test_work_that_nobody_asks_for_is_given_up() -> None:
+    work = Beside(lambda: time.sleep(60.0))
+    work.end()
+    del work
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_a_known_result_needs_no_work() -> None:
+    assert Beside.known(3).result() == 3
 
 
 def seven_fails(n: int) -> int:

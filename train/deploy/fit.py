@@ -16,12 +16,11 @@ from .lessons import lesson_of
 
 if TYPE_CHECKING:
     from ...runtime.mesh import Charts, Surface
-    from ...runtime.progress import Progress
     from .config import FitConfig
     from .gated import GatedExperts
 
 
-def fit_networks(surface: Surface, charts: Charts, config: FitConfig, seed: int, progress: Progress) -> GatedExperts:
+def fit_networks(surface: Surface, charts: Charts, config: FitConfig, seed: int) -> GatedExperts:
     """Networks xyz (n, 3) → uv (n, 2) in chart coordinates, chart (n,), score (n,).
 
     Args:
@@ -29,13 +28,8 @@ def fit_networks(surface: Surface, charts: Charts, config: FitConfig, seed: int,
         charts: of that surface; their uv in any unit.
         config: samples, sizes, tolerance.
         seed: of the samples.
-        progress: told of the stage "fit".
     """
-    progress("fit", 0, 2)
     rng = np.random.default_rng(seed)
     lesson = lesson_of(surface, charts, config.samples, rng)
-    progress("fit", 1, 2)
     extent = float(np.sqrt(np.abs(signed_areas(charts.corner_uv)).sum()))
-    networks = grow(lesson, config.grow, config.tolerance * extent, rng)
-    progress("fit", 2, 2)
-    return networks
+    return grow(lesson, config.grow, config.tolerance * extent, rng)

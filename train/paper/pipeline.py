@@ -9,6 +9,7 @@ that come back, in source units.
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..config import TrainConfig
 from ..deploy.fit import fit_networks
 from ..pipeline import Trained, as_charts
 from ..sampling import sample_surface
+from ..workers import Beside
 from .batches import PaperInput
 from .finishing import GlobalFinishConfig, finish_global
 from .learnedseams import SeamConfig, cut_points, tears
@@ -77,11 +79,11 @@ def train_paper_surface(
     charts = as_charts(ball, finished)
     charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
     report["finished"] = finished_figures(surface, charts, finished)
-    networks = fit_networks(ball, charts, deploy.fit, config.seed, progress)
+    fitted = Beside(partial(fit_networks, ball, charts, deploy.fit, config.seed))
     settings = {"preset": "paper", **asdict(config), "deploy": asdict(deploy)}
     if config.mode == "global":
         settings["global_finish"] = {name: part for name, part in asdict(finishing).items() if name != "finish"}
-    return Trained(charts, networks, frame, settings, report, paper)
+    return Trained(charts, fitted, frame, settings, report, paper)
 
 
 def finish_learned(

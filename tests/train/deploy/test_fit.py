@@ -20,12 +20,8 @@ Cut = tuple[Surface, Charts]
 QUICK = FitConfig(samples=SampleConfig(even=20_000, beside=20_000))
 
 
-def silence(stage: str, step: int, steps: int, loss: float | None = None) -> None:
-    """Progress that nobody watches."""
-
-
 def fitted(cut: Cut, config: FitConfig = QUICK, seed: int = 0) -> GatedExperts:
-    return fit_networks(*cut, config, seed, silence)
+    return fit_networks(*cut, config, seed)
 
 
 def judged(networks: GatedExperts, cut: Cut, count: int = 5000) -> tuple[float, float]:
@@ -156,17 +152,6 @@ def test_the_same_seed_gives_the_same_networks(two_halves: Cut) -> None:
     assert np.array_equal(first.weights, again.weights)
     assert np.array_equal(first.start, again.start)
     assert not np.array_equal(first.centre, other.centre)
-
-
-def test_progress_is_told(two_halves: Cut) -> None:
-    told: list[tuple[str, int, int]] = []
-
-    def note(stage: str, step: int, steps: int, loss: float | None = None) -> None:
-        del loss
-        told.append((stage, step, steps))
-
-    fit_networks(*two_halves, QUICK, 0, note)
-    assert told == [("fit", 0, 2), ("fit", 1, 2), ("fit", 2, 2)]
 
 
 def test_a_real_mesh_in_charts_by_direction(models: Path) -> None:

@@ -190,7 +190,7 @@ def test_hardly_trained_networks_still_give_valid_charts_in_source_units(mode: s
     )
     result = train_paper_surface(torus, config, note, deploy=DEPLOY)
     assert stages[0] == "train"
-    assert stages[-1] == "fit"
+    assert stages[-1] == "exact check"
     charts = result.charts
     metrics = measure(torus, side_by_side(charts), charts.face_chart)
     assert (metrics.flipped_faces, metrics.overlap_fraction) == (0, 0.0)
