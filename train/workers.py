@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import pickle  # only between this process and its own copies, never from a file
+import select
 import signal
 import struct
 import sys
@@ -19,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from ..runtime.cores import core_count
 from ..runtime.errors import FinishError
+from ..runtime.meanwhile import load_next
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -176,6 +178,8 @@ def forked(function: Callable[[Item], Result], items: Sequence[Item], tickets: i
 
 def collected(copy: Copy) -> dict[int, Any]:
     """What a copy found.  Raises what its function raised, or FinishError when it ended without an answer."""
+    while not select.select([copy.results], [], [], 0.0)[0] and load_next():
+        pass
     with os.fdopen(os.dup(copy.results), "rb") as pipe:
         sent = pipe.read()
     if not sent:

@@ -18,11 +18,12 @@ from scipy.spatial import KDTree
 from ...runtime.deadline import Late, never
 from ...runtime.geometry.cutgraph import edge_costs, path_mask
 from ...runtime.geometry.distortion import excess, oriented_energy
+from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.straightpaths import Roads, straightest_path
-from ...runtime.geometry.topology import edge_table, face_components
+from ...runtime.geometry.topology import boundary_loops, edge_table, face_components
 from ..finish.arap import RigidSteps, evened_out
-from ..finish.contact import Relaxed, boundary_edges, relax, rim_overlaps, separate
-from ..finish.flatten import jacobians, sorted_loops
+from ..finish.contact import Relaxed, boundary_edges, converge, relax, rim_overlaps, separate
+from ..finish.flatten import jacobians
 from ..finish.pieces import Overlapping, Piece, flattened, measured
 from ..finish.slits import Flat
 from ..seams.closing import opened_along, path_length
@@ -32,6 +33,7 @@ from ..search.search import Search
 from ..workers import parallel_map
 from .fine import bounded
 from .layout import carried_jacobians
+from .moved import as_others_lead
 from .sides import faces_beside
 
 if TYPE_CHECKING:
@@ -39,9 +41,11 @@ if TYPE_CHECKING:
 
     from ...runtime.mesh import Surface
     from ..config import FinishConfig
+    from ..finish.config import ContactConfig
     from .config import ArcConfig
 
-    Laid = Piece | Overlapping | None
+    Laid = Piece | NDArray[np.int64]
+    """What became of a piece, or the faces of the surface that make it invalid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,25 +90,33 @@ class Straightening:
         self.failed: set[int] = set()
 
     def run(self, rounds: int) -> Search:
-        """The search with those of the arcs on their new ways that leave every piece valid and do not cost more."""
+        """The search with those of the arcs on their new ways that leave every piece valid and do not cost more.
+
+        Once that is so, those that cost more than they save go back too, as long as that helps.
+        """
+        best = self.search
         for _ in range(rounds):
             if not self.arcs:
                 break
             found, wrong = self.laid()
-            if found is not None and self.is_no_worse(found):
-                return found
+            if found is not None and self.is_no_worse(found, best):
+                best = found
+            elif best is not self.search:
+                break
             gain = self.gains(found) if found is not None else -self.nearest(wrong)
             back = gain < 0.0 if (gain < 0.0).any() else gain <= gain.min()
+            if found is best and -gain[gain < 0.0].sum() < self.search.config.arcs.worth:
+                break
             failed = set(self.label[wrong > 0.0].tolist())
             stuck = np.array([bool(failed & self.failed & set(arc.sides)) for arc in self.arcs])
             self.failed |= failed
             self.arcs = [arc for arc, each in zip(self.arcs, back | stuck, strict=True) if not each]
-        return self.search
+        return best
 
-    def is_no_worse(self, found: Search) -> bool:
-        """Whether the objective is no higher, and the stretch within its bound, if it was."""
+    def is_no_worse(self, found: Search, best: Search) -> bool:
+        """Whether the objective is no higher than the best one, and the stretch within its bound, if it was."""
         bound = max(found.config.stretch or np.inf, self.search.energy())
-        return found.objective() <= self.search.objective() and found.energy() <= bound
+        return found.objective() <= best.objective() and found.energy() <= bound
 
     def laid(self) -> tuple[Search | None, NDArray[np.float64]]:
         """The search with the arcs on their new ways; None where a piece is not valid then.
@@ -117,16 +129,19 @@ class Straightening:
         sides = [np.flatnonzero(part == number) for number in range(int(part.max()) + 1)]
         owner = [int(np.bincount(self.label[ids]).argmax()) for ids in sides]
         if sorted(owner) != sorted(keys):
-            wrong[~np.isin(self.label, [key for key in keys if owner.count(key) == 1])] = 1.0
+            wrong[~np.isin(self.label, owner)] = 1.0  # what is cut off, and the pieces that are no more
+            largest = {key: ids for ids, key in sorted(zip(sides, owner, strict=True), key=lambda side: len(side[0]))}
+            for key, ids in zip(owner, sides, strict=True):
+                wrong[ids] = np.maximum(wrong[ids], ids is not largest[key])
             return None, wrong
         made = parallel_map(lambda job: self.piece(*job, seam), list(zip(owner, sides, strict=True)))
-        found = Search(self.search.surface, self.search.graph, self.search.config)
+        found = self.search.emptied()
         for key, ids, (name, laid) in zip(owner, sides, made, strict=True):
             self.known[key, name] = ids, laid
             if isinstance(laid, Piece) and self.search.is_bearable(laid):
                 found.add(laid)
             else:
-                wrong[ids[laid.pairs()] if isinstance(laid, Overlapping) else ids] = 1.0
+                wrong[ids if isinstance(laid, Piece) else laid] = 1.0
         return (None if wrong.any() else found), wrong
 
     def moved(self) -> NDArray[np.bool_]:
@@ -170,24 +185,36 @@ def face_energies(search: Search) -> NDArray[np.float64]:
 
 
 def laid_alike(search: Search, ids: NDArray[np.int64], seam: NDArray[np.bool_], source: Piece) -> Laid:
-    """Faces cut along a mask (e,), laid out from where their source lies; None where they are no disk, or fold."""
+    """Faces cut along a mask (e,), laid out from where their source lies; or those that keep them from being valid."""
     opened = opened_along(search, ids, seam)
     if opened is None:
-        return None
+        return ids
     disk, slits = opened
-    contact = replace(search.config.slit.contact, rounds=search.config.closing.rounds)
-    start = evened_out(disk.faces, as_it_lay(disk, source.flat, search.config), contact.unfolding)
-    edges = boundary_edges(disk.faces)
-    if start is not None and len(sorted_loops(disk)) == 1 and not rim_overlaps(disk.faces, edges, start):
-        uv = relax(disk, Relaxed(start, {}), contact).uv
-    else:
+    contact = replace(search.config.slit.contact, rounds=search.config.closing.rounds, steps=search.config.arcs.steps)
+    led = as_others_lead(disk, ids, source, search.config.fine) if len(boundary_loops(disk.faces)) == 1 else None
+    if led is None:
         uv = flattened(disk, contact, np.inf, lambda filled: as_it_lay(filled, source.flat, search.config))
-    if uv is not None and rim_overlaps(disk.faces, edges, uv):
+    else:
+        uv = relaxed(disk, led, contact)
+    if uv is None:
+        return ids if led is None else ids[flipped_triangles(led[disk.faces])]
+    edges = boundary_edges(disk.faces)
+    if rim_overlaps(disk.faces, edges, uv):
         apart = separate(disk, Relaxed(uv, {}), edges, contact)
         if apart is None:
-            return Overlapping(ids, Flat(disk, uv, {}), slits)
+            return ids[Overlapping(ids, Flat(disk, uv, {}), slits).pairs().reshape(-1)]
         uv = apart.uv
-    return None if uv is None else measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+
+
+def relaxed(disk: Surface, uv: NDArray[np.float64], contact: ContactConfig) -> NDArray[np.float64] | None:
+    """Uv (v, 2) by SLIM from uv, which may hold a few flips; None where these stay.  It overlaps if the start does."""
+    start = evened_out(disk.faces, uv, contact.unfolding)
+    if start is None:
+        return None
+    if rim_overlaps(disk.faces, boundary_edges(disk.faces), start):
+        return converge(disk, Relaxed(start, {}), np.inf, contact)
+    return relax(disk, Relaxed(start, {}), contact).uv
 
 
 def as_it_lay(disk: Surface, source: Flat, config: FinishConfig) -> NDArray[np.float64]:
@@ -219,7 +246,7 @@ def straighter_arcs(search: Search, width: float, longest: int, config: ArcConfi
         near[np.concatenate(tree.query_ball_point(points[path], reach)).astype(np.int64)] = True
         near[barred] = False
         near[path] = True
-        inside = np.append(np.flatnonzero(near[table.edges].all(axis=1) & free), old)
+        inside = np.append(np.flatnonzero(near[table.edges[:, 0]] & near[table.edges[:, 1]] & free), old)
         roads = Roads(points, table.edges[inside], cost[inside])
         way = straightest_path(roads, int(path[0]), int(path[-1]), config.turning)
         new = np.flatnonzero(path_mask(table, [way])) if way else old

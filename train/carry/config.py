@@ -122,5 +122,9 @@ class ArcConfig:
     """Edges of an arc that is looked at."""
     rounds: int = 6
     """Times that arcs are put back where a piece would be worse, before all of them are."""
+    worth: float = 1e-4
+    """Objective that arcs which cost more than they save lose together, below which they stay."""
+    steps: int = 2
+    """Steps of SLIM in which a piece that would overlap is held apart by contacts."""
     most_faces: int = 30000
     """Faces of a surface on which seams are left as they are."""

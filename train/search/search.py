@@ -6,6 +6,7 @@ neck.  Merges are ranked by the energy that curvature foretells, and only the be
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -56,6 +57,12 @@ class Search(State):
         self.tried: dict[Pair, Trimmed | None] = {}
         self.foretold: dict[Pair, tuple[float, float]] = {}
         self.settled: set[int] = set()
+
+    def emptied(self) -> Self:
+        """A search of the same surface without pieces."""
+        fresh = copy(self)
+        fresh.pieces, fresh.loose, fresh.tried, fresh.foretold, fresh.settled, fresh._next = {}, [], {}, {}, set(), 0
+        return fresh
 
     def foretell(self, pair: Pair) -> tuple[float, float]:
         """What curvature foretells of two pieces as one: their cost, and the border that a merge is sure to save."""
