@@ -56,7 +56,6 @@ _HOME = {
     "pack": "bake.repack.repacked",
     "UnwrapSession": "runtime.sessions.session",
 }
-_AFTER_CHARTS = ("runtime.pack.asked", "runtime.geometry.metrics", "runtime.sessions.agreement", "export.assemble")
 _MODULES = ("bake", "export", "runtime", "train", "xatlas")
 
 
@@ -121,22 +120,15 @@ def unwrap_asset(
     asset: Asset, options: Options, progress: Progress | None = None, keep: tuple[Path, int] | None = None
 ) -> UnwrapResult:
     """Train, finish, pack, measure, export.  keep: folder and interval of checkpoints.  Raises as `unwrap`."""
-    from .runtime.extras import demand_found, requires
-    from .runtime.meanwhile import load_meanwhile
+    from .runtime.extras import requires
     from .runtime.progress import Clock
 
     with requires("unwrap"):
+        from .export.whole import unwrapped
         from .runtime.io.asset.shading import shaded
-        from .train.presets import train_asset
 
-        demand_found("onnx", "onnxruntime")
-    load_meanwhile("scipy.optimize", "onnx", "onnxruntime", *(f"{__name__}.{module}" for module in _AFTER_CHARTS))
     clock, asset = Clock.of(progress), shaded(asset, options.crease_angle)
-    trained = train_asset(asset, options, clock, keep)
-    from .export.assemble import assemble
-    from .runtime.pack.square import square_of
-
-    return UnwrapResult(asset, assemble(asset, trained, clock, square_of(options)))
+    return UnwrapResult(asset, unwrapped(asset, options, clock, keep))
 
 
 def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None = None) -> UnwrapPages:
@@ -165,13 +157,10 @@ def unwrap_cloud(
     from .runtime.progress import Clock
 
     with requires("unwrap"):
-        from .export.assemble import assemble
-        from .runtime.pack.square import square_of
-        from .train.presets import train_cloud
+        from .export.whole import unwrapped_cloud
 
-    clock = Clock.of(progress)
-    mesh, trained = train_cloud(cloud, options, clock, keep)
-    return UnwrapResult(mesh.asset, assemble(mesh.asset, trained, clock, square_of(options)), cloud, mesh)
+    mesh, found = unwrapped_cloud(cloud, options, Clock.of(progress), keep)
+    return UnwrapResult(mesh.asset, found, cloud, mesh)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from .errors import FlexparaError, MissingDependencyError
@@ -13,13 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 PACKAGE = "flexpara"
-
-
-def demand_found(*packages: str) -> None:
-    """See that packages are there, without loading them.  Raises: ModuleNotFoundError."""
-    for name in packages:
-        if find_spec(name) is None:
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
 @contextmanager

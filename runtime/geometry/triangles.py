@@ -27,12 +27,20 @@ def signed_areas(uv: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def triangle_cross(triangles: NDArray[Any]) -> NDArray[Any]:
     """(…, 3) edge cross products of triangles (…, 3, 3): along the right-handed normal, twice the area long."""
-    return np.cross(triangles[..., 1, :] - triangles[..., 0, :], triangles[..., 2, :] - triangles[..., 0, :])
+    return np.stack(_cross(triangles), axis=-1)
+
+
+def _cross(triangles: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """The three coordinates (…) of that, in half the time that np.cross takes for small arrays."""
+    ax, ay, az = (triangles[..., 1, axis] - triangles[..., 0, axis] for axis in range(3))
+    bx, by, bz = (triangles[..., 2, axis] - triangles[..., 0, axis] for axis in range(3))
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def triangle_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """(…) areas of triangles (…, 3, 3), in their unit squared."""
-    return 0.5 * np.linalg.norm(triangle_cross(triangles), axis=-1)
+    x, y, z = _cross(triangles)
+    return 0.5 * np.sqrt(x * x + y * y + z * z)
 
 
 def triangle_normals(triangles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -156,10 +156,10 @@ class Straightening:
     def piece(self, key: int, ids: NDArray[np.int64], seam: NDArray[np.bool_]) -> tuple[frozenset[int], Laid]:
         """What becomes of a piece, once for the same arcs beside it; and their names."""
         name, source = frozenset(id(arc) for arc in self.arcs if key in arc.sides), self.search.pieces[key]
-        before, laid = self.known.get((key, name), (ids, None)) if name else (np.sort(source.ids), source)
+        known = self.known.get((key, name)) if name else (np.sort(source.ids), source)
         # an arc beside neither may still take faces of this piece, where ways of several meet
-        if np.array_equal(before, ids) and (not name or (key, name) in self.known):
-            return name, laid
+        if known is not None and np.array_equal(known[0], ids):
+            return name, known[1]
         return name, laid_alike(self.search, ids, seam, source)
 
     def gains(self, found: Search) -> NDArray[np.float64]:

@@ -153,11 +153,6 @@ def foretold_energies(
     return areas * excess(np.cosh(2.0 * scale))
 
 
-def foretold_energy(surface: Surface, u: NDArray[np.float64]) -> float:
-    """Σ of ``foretold_energies``."""
-    return float(foretold_energies(surface.faces, surface.face_areas(), u).sum())
-
-
 def border_first(surface: Surface, loop: NDArray[np.int64], config: CotangentConfig) -> NDArray[np.float64]:
     """Uv (v, 2) of a disk: its border loop (b,) laid out with its own lengths, the inside harmonic.  May hold flips."""
     border = np.zeros(len(surface.vertices), dtype=bool)

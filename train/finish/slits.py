@@ -15,7 +15,7 @@ from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.mesh import Surface
 from .contact import Relaxed, excess_energy, relax
-from .curvature import Curvature, foretold_energy
+from .curvature import Curvature, foretold_energies
 from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
 from .flatten import jacobians
 
@@ -196,7 +196,8 @@ def foreseen_slits(surface: Surface, total_area: float, config: SlitConfig) -> t
     rim = border_of(table, count)
     curvature = Curvature.of(surface, config.contact.cotangents)
     u = curvature.factor(rim)
-    energy = foretold_energy(surface, u) / total_area
+    areas = surface.face_areas()
+    energy = float(foretold_energies(surface.faces, areas, u).sum()) / total_area
     paths: list[list[int]] = []
     spared: list[NDArray[np.float64]] = []
     while len(spared) < config.failures and len(paths) < config.foreseen and energy > config.price * config.shortest:
@@ -208,7 +209,7 @@ def foreseen_slits(surface: Surface, total_area: float, config: SlitConfig) -> t
         wider = rim.copy()
         wider[path] = True
         trial = curvature.factor(wider)
-        left = foretold_energy(surface, trial) / total_area
+        left = float(foretold_energies(surface.faces, areas, trial).sum()) / total_area
         length = path_length(surface, path) / unit
         if energy - left < config.sure * config.price * max(length, config.shortest):
             spared.append(surface.vertices[tip])

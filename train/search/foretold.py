@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
+from ...runtime.geometry.topology import face_components
 from ..finish.curvature import Curvature, foretold_energies
 
 if TYPE_CHECKING:
@@ -55,9 +54,8 @@ class Foretold:
         shared = shared[self.table.manifold[shared]]
         ends = self.table.edges[shared]
         used, index = np.unique(ends, return_inverse=True)
-        i, j = index.reshape(-1, 2).T
-        links = sparse.coo_array((np.ones(len(i)), (i, j)), shape=(len(used), len(used)))
-        run = connected_components(links, directed=False)[1][i]
+        index = index.reshape(-1, 2)
+        run = face_components(len(used), index)[index[:, 0]]
         points = self.surface.vertices[ends]
         length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         return float(np.bincount(run, length).max(initial=0.0)) / self.unit

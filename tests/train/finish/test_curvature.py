@@ -17,7 +17,6 @@ from flexpara.train.finish.curvature import (
     corner_cotangents,
     factorize,
     foretold_energies,
-    foretold_energy,
 )
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.finish.slits import border_of
@@ -126,7 +125,7 @@ def test_the_energy_foretold_is_that_of_a_similarity_and_capped() -> None:
     assert foretold_energies(RIGHT.faces, np.array([3.0]), -u) == pytest.approx([3.0 * ((4.0 + 0.25) / 2.0 - 1.0)])
     assert foretold_energies(RIGHT.faces, np.array([3.0]), 0.0 * u) == pytest.approx([0.0])
     assert foretold_energies(RIGHT.faces, np.array([3.0]), 100.0 * u) == pytest.approx([30.0])
-    assert foretold_energy(RIGHT, u) == pytest.approx(0.5 * 1.125)
+    assert foretold_energies(RIGHT.faces, RIGHT.face_areas(), u).sum() == pytest.approx(0.5 * 1.125)
 
 
 def test_the_energy_foretold_orders_caps_of_a_sphere_by_how_much_they_cover() -> None:
@@ -135,7 +134,8 @@ def test_the_energy_foretold_orders_caps_of_a_sphere_by_how_much_they_cover() ->
     for height in (0.8, 0.4, 0.0, -0.4):
         used, index = np.unique(sphere.faces[sphere.triangles.mean(axis=1)[:, 2] > height], return_inverse=True)
         cap = Surface(sphere.vertices[used], index.reshape(-1, 3).astype(np.int64))
-        energy.append(foretold_energy(cap, Curvature.of(cap, CONFIG).factor(rim_of(cap))))
+        factor = Curvature.of(cap, CONFIG).factor(rim_of(cap))
+        energy.append(foretold_energies(cap.faces, cap.face_areas(), factor).sum())
     assert energy == sorted(energy)
     assert energy[0] < 0.01 * energy[-1]
 

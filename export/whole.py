@@ -1,0 +1,34 @@
+"""A whole unwrap: charts first, then all that follows, whose modules are loaded while charts are found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..runtime.pack.square import square_of
+from ..train.presets import train_asset, train_cloud
+
+if TYPE_CHECKING:
+    from ..runtime.io.points.cloud import CloudMesh, PointCloud
+    from ..runtime.mesh import Asset
+    from ..runtime.options.unwrap import Options
+    from ..runtime.progress import Clock
+    from ..train.presets import Keep
+    from .assemble import Unwrapped
+
+
+def unwrapped(asset: Asset, options: Options, clock: Clock, keep: Keep | None = None) -> Unwrapped:
+    """Train, finish, pack, measure, export.  Raises: as `train_asset` and `assemble`."""
+    trained = train_asset(asset, options, clock, keep)
+    from .assemble import assemble
+
+    return assemble(asset, trained, clock, square_of(options))
+
+
+def unwrapped_cloud(
+    cloud: PointCloud, options: Options, clock: Clock, keep: Keep | None = None
+) -> tuple[CloudMesh, Unwrapped]:
+    """Triangles laid over the points, and the same of these.  Raises: as `train_cloud` and `assemble`."""
+    mesh, trained = train_cloud(cloud, options, clock, keep)
+    from .assemble import assemble
+
+    return mesh, assemble(mesh.asset, trained, clock, square_of(options))
