@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MOST_SAMPLES = 400_000
+_COARSE = 4
+"""Spacings from one sample to the next where pairs that may be the closest are looked for."""
+_REACHES = (1.0, 3.0, 9.0, 27.0)
+"""Such distances up to which they are; beyond, a triangulation is quicker."""
 
 
 def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], *, spacing: float) -> float | None:
@@ -32,8 +36,34 @@ def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], 
     Returns:
         The gap in uv units; None where there is one chart only, or all outlines lie on one line.
     """
-    pairs = facing_segments(segments, chart, spacing=spacing, reach=2.0 * spacing)
-    return float(segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]).min()) if len(pairs) else None
+    if not has_gaps(segments, chart):
+        return None
+    points, owner, coarse = _samples(segments, _COARSE * spacing)
+    reach = _gap_of_points(points, chart[owner], coarse)
+    if reach is None:
+        pairs = facing_segments(segments, chart, spacing=spacing, reach=2.0 * spacing)
+    else:
+        pairs = near_segments(segments, chart, spacing=coarse, reach=reach)
+    return float(segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]).min())
+
+
+def has_gaps(segments: NDArray[np.float64], chart: NDArray[np.int64]) -> bool:
+    """False where there is one chart only, or all outlines lie on one line."""
+    if len(np.unique(chart)) < 2:  # closed surfaces without a seam have no outline at all
+        return False
+    extent = np.ptp(segments.reshape(-1, 2), axis=0)
+    return bool(extent.min() > 1e-9 * extent.max())
+
+
+def _gap_of_points(points: NDArray[np.float64], chart: NDArray[np.int64], spacing: float) -> float | None:
+    """Smallest distance of points (n, 2) of different charts (n,); None where it is many times their spacing."""
+    tree = KDTree(points)
+    for steps in _REACHES:
+        one, other = tree.query_pairs(steps * spacing, output_type="ndarray").T
+        across = chart[one] != chart[other]
+        if across.any():
+            return float(np.linalg.norm(points[one[across]] - points[other[across]], axis=1).min())
+    return None
 
 
 def facing_segments(
@@ -50,10 +80,7 @@ def facing_segments(
     Returns:
         (p, 2) int64 segment indices; none where there is one chart only, or all outlines lie on one line.
     """
-    if len(np.unique(chart)) < 2:  # closed surfaces without a seam have no outline at all
-        return np.zeros((0, 2), dtype=np.int64)
-    extent = np.ptp(segments.reshape(-1, 2), axis=0)
-    if extent.min() <= 1e-9 * extent.max():
+    if not has_gaps(segments, chart):
         return np.zeros((0, 2), dtype=np.int64)
     points, owner = sample_segments(segments, spacing)
     order = np.lexsort((chart[owner], points[:, 1], points[:, 0]))

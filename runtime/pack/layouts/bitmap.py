@@ -151,7 +151,9 @@ def nest(charts: list[list[Mask]], order: NDArray[np.int64], columns: int, *, mo
     chosen, place, size = np.zeros(len(charts), np.int64), np.zeros((len(charts), 2), np.int64), [0, 0]
     for chart in order.tolist():
         fitting = [(number, mask) for number, mask in enumerate(charts[chart]) if mask.width <= columns]
-        spread = _spreads(taken, max((mask.width for _, mask in fitting), default=1))
+        # on top of all others there is room: nothing above what would lie there matters
+        below = (1 << (size[1] + extents[chart] + 1) * stride) - 1
+        spread = _spreads(taken & below, max((mask.width for _, mask in fitting), default=1))
         tops = [(_lowest(spread, mask, stride), number) for number, mask in fitting]
         best = min(
             ((row + charts[chart][number].height, row, column, number) for (row, column), number in tops), default=None
