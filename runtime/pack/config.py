@@ -86,7 +86,7 @@ class GrowthConfig:
     """Factor on it after a round in which charts came too close to each other, which is undone."""
     reach: float = 1.0 / 8.0
     """Segments this much farther apart than the closest ones still count as facing each other, share."""
-    sample: float = 1.0 / 512.0
+    sample: float = 1.0 / 256.0
     """Distance of the samples by which facing segments are found, share."""
     repairs: int = 40
     """How often the exact distances may still find a pair too close in the end."""

@@ -213,7 +213,8 @@ def relaxed(disk: Surface, uv: NDArray[np.float64], contact: ContactConfig) -> N
     if start is None:
         return None
     if rim_overlaps(disk.faces, boundary_edges(disk.faces), start):
-        return converge(disk, Relaxed(start, {}), np.inf, contact)
+        free = converge(disk, Relaxed(start, {}), np.inf, contact)
+        return free if free is not None and np.isfinite(free).all() else None
     return relax(disk, Relaxed(start, {}), contact).uv
 
 

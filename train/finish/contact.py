@@ -168,12 +168,12 @@ def converge(surface: Surface, start: Relaxed, goal: float, config: ContactConfi
 def relax(surface: Surface, start: Relaxed, config: ContactConfig, *, goal: float = np.inf) -> Relaxed:
     """SLIM from a valid flattening to a valid one: freely first; where that ends in overlap, in small steps.
 
-    Returns the start where ``goal`` (excess energy) is out of sight, and the last valid state where contacts can't hold
-    the chart apart; with ``config.rounds`` = 0 there are no contacts.
+    Returns the start where ``goal`` (excess energy) is out of sight or a face has no area, and the last valid state
+    where contacts can't hold the chart apart; with ``config.rounds`` = 0 there are no contacts.
     """
     edges = boundary_edges(surface.faces)
     free = converge(surface, start, goal, config)
-    if free is None:
+    if free is None or not np.isfinite(free).all():
         return start
     if not rim_overlaps(surface.faces, edges, free):
         return Relaxed(free, start.pins)
