@@ -57,10 +57,10 @@ def followers(tail: NDArray[np.int64], head: NDArray[np.int64]) -> tuple[NDArray
 
     The way back along the same edge is none: the second half of the edges are the first, turned round.
     """
-    count, size = int(max(tail.max(initial=0), head.max(initial=0))) + 1, len(tail)
-    number, ones = np.arange(size), np.ones(size)
-    ending = sparse.csr_array((ones, (number, head)), shape=(size, count))
-    beginning = sparse.csr_array((ones, (tail, number)), shape=(count, size))
-    before, after = (ending @ beginning).nonzero()
+    size, order = len(tail), np.argsort(tail, kind="stable")
+    first, last = (np.searchsorted(tail[order], head, side=side) for side in ("left", "right"))
+    before = np.repeat(np.arange(size), last - first)
+    step = np.arange(len(before)) - np.repeat(np.cumsum(last - first) - (last - first), last - first)
+    after = order[first[before] + step]
     other = before % (size // 2) != after % (size // 2) if size else np.zeros(0, dtype=bool)
-    return before[other].astype(np.int64), after[other].astype(np.int64)
+    return before[other], after[other]

@@ -153,11 +153,16 @@ def foretold_energies(
     return areas * excess(np.cosh(2.0 * scale))
 
 
-def border_first(surface: Surface, loop: NDArray[np.int64], config: CotangentConfig) -> NDArray[np.float64]:
-    """Uv (v, 2) of a disk: its border loop (b,) laid out with its own lengths, the inside harmonic.  May hold flips."""
+def border_first(
+    surface: Surface, loop: NDArray[np.int64], config: CotangentConfig, curvature: Curvature | None = None
+) -> NDArray[np.float64]:
+    """Uv (v, 2) of a disk: its border loop (b,) laid out with its own lengths, the inside harmonic.  May hold flips.
+
+    curvature: of the disk, where it is known.
+    """
     border = np.zeros(len(surface.vertices), dtype=bool)
     border[loop] = True
-    curvature = Curvature.of(surface, config)
+    curvature = curvature or Curvature.of(surface, config)
     bend = np.pi - curvature.turn[loop] + curvature.product(curvature.factor(border))[loop]
     points = surface.vertices[loop]
     uv = np.zeros((len(surface.vertices), 2))

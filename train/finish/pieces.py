@@ -15,7 +15,7 @@ from ...runtime.geometry.topology import split_non_manifold_vertices
 from ...runtime.mesh import Surface
 from .arap import unfolded
 from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_faces, rim_overlaps, separate
-from .curvature import border_first
+from .curvature import Curvature, border_first
 from .flatten import circle_map, fill_holes, slim, sorted_loops
 from .openings import openings, slit_along
 from .slits import Flat, Slit, foreseen_slits, slit_where_it_pays
@@ -95,7 +95,7 @@ def border_length(piece: Surface) -> float:
 
 
 def flattened(
-    piece: Surface, config: ContactConfig, goal: float, given: Start | None = None
+    piece: Surface, config: ContactConfig, goal: float, given: Start | None = None, curvature: Curvature | None = None
 ) -> NDArray[np.float64] | None:
     """The uv (v, 2) of a disk, holes allowed, after SLIM: without flips; it may overlap.
 
@@ -105,7 +105,7 @@ def flattened(
     """
     outer, *holes = sorted_loops(piece)
     filled = fill_holes(piece, holes)
-    start = flipless_start(filled, outer, config, given)
+    start = flipless_start(filled, outer, config, given, curvature)
     if start is None:
         return None
     uv = converge(filled, Relaxed(start, {}), goal, config)
@@ -115,13 +115,19 @@ def flattened(
 
 
 def flipless_start(
-    disk: Surface, loop: NDArray[np.int64], config: ContactConfig, given: Start | None = None
+    disk: Surface,
+    loop: NDArray[np.int64],
+    config: ContactConfig,
+    given: Start | None = None,
+    curvature: Curvature | None = None,
 ) -> NDArray[np.float64] | None:
     """A first uv (v, 2) of a disk without flips: near its isometry, else on the circle; None where both have flips.
 
-    ``given`` is tried before the border laid out with its own lengths.
+    ``given`` is tried before the border laid out with its own lengths.  ``curvature``: of the disk, where it is known;
+    that of another surface plays no part.
     """
-    laid_out = [lambda disk: border_first(disk, loop, config.cotangents)]
+    known = curvature if curvature is not None and curvature.surface is disk else None
+    laid_out = [lambda disk: border_first(disk, loop, config.cotangents, known)]
     for start in laid_out if given is None else [given, *laid_out]:
         uv = start(disk)
         if not np.isfinite(uv).all():
@@ -166,11 +172,12 @@ def try_piece(
     price = config.slit.price
     best: Piece | Overlapping | None = None
     for disk, cuts in openings(slit_along(whole, slits, config.slit), config.slit.seams):
-        more = cuts
+        more, curvature = cuts, None
         if start is None:
-            disk, foreseen = foreseen_slits(disk, total_area, config.slit)
+            curvature = Curvature.of(disk, config.slit.contact.cotangents)
+            disk, foreseen = foreseen_slits(curvature, total_area, config.slit)
             more = (*cuts, *foreseen)
-        uv = flattened(disk, config.slit.contact, goal * total_area, start)
+        uv = flattened(disk, config.slit.contact, goal * total_area, start, curvature)
         if uv is None:
             continue
         energy = excess_energy(disk, uv) / total_area

@@ -184,17 +184,17 @@ def best_slit(
     return None
 
 
-def foreseen_slits(surface: Surface, total_area: float, config: SlitConfig) -> tuple[Surface, tuple[Slit, ...]]:
+def foreseen_slits(curvature: Curvature, total_area: float, config: SlitConfig) -> tuple[Surface, tuple[Slit, ...]]:
     """The disk with the slits that its curvature asks for before anything is flattened, and those slits.
 
     Greedy: slit to the vertex that a conformal map would squeeze most, as long as the energy foretold falls by
     ``config.sure`` times what the slit costs.  To fix u = 0 along a path is to open it: all are cut at the end.
     """
+    surface = curvature.surface
     unit, count = float(np.sqrt(total_area)), len(surface.vertices)
     table = edge_table(surface.faces)
     cost = edge_costs(surface, table, config.seams)
     rim = border_of(table, count)
-    curvature = Curvature.of(surface, config.contact.cotangents)
     u = curvature.factor(rim)
     areas = surface.face_areas()
     energy = float(foretold_energies(surface.faces, areas, u).sum()) / total_area

@@ -14,6 +14,7 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.finish.config import SlitConfig
 from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.curvature import Curvature
 from flexpara.train.finish.flatten import flatten
 from flexpara.train.finish.pieces import border_length
 from flexpara.train.finish.slits import Slit, border_of, foreseen_slits, lowest_factor
@@ -37,7 +38,7 @@ def excess(surface: Surface) -> float:
 
 
 def foreseen(surface: Surface, config: SlitConfig = CONFIG) -> tuple[Surface, tuple[Slit, ...]]:
-    return foreseen_slits(surface, float(surface.face_areas().sum()), config)
+    return foreseen_slits(Curvature.of(surface, config.contact.cotangents), float(surface.face_areas().sum()), config)
 
 
 def test_the_border_is_known_by_its_vertices() -> None:
