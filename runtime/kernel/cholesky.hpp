@@ -39,12 +39,9 @@ class Cholesky {
     static std::vector<int> ordering(int n, const std::vector<std::pair<int, int>>& links) {
         if (n == 0) return {};
         std::vector<Eigen::Triplet<double, int>> entries;
-        entries.reserve(2 * links.size() + n);
+        entries.reserve(links.size() + n);
         for (int i = 0; i < n; ++i) entries.emplace_back(i, i, 1.0);
-        for (auto [i, j] : links) {
-            entries.emplace_back(i, j, 1.0);
-            entries.emplace_back(j, i, 1.0);
-        }
+        for (auto [i, j] : links) entries.emplace_back(i, j, 1.0);  // the ordering adds the transposed ones
         Eigen::SparseMatrix<double, Eigen::ColMajor, int> pattern(n, n);
         pattern.setFromTriplets(entries.begin(), entries.end());
         Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
@@ -127,17 +124,18 @@ class Cholesky {
 
     // rows_: of each permuted row k, the rows before it that it shares an entry with, ascending.
     void collect(const std::vector<std::pair<int, int>>& links) {
-        std::vector<std::vector<int>> before(n_);
-        for (auto [i, j] : links) {
-            const int k = std::max(place_[i], place_[j]), r = std::min(place_[i], place_[j]);
-            if (k != r) before[k].push_back(r);
-        }
+        std::vector<int> first(n_ + 1, 0);
+        for (auto [i, j] : links) ++first[std::max(place_[i], place_[j]) + 1];
+        std::partial_sum(first.begin(), first.end(), first.begin());
+        std::vector<int> before(links.size()), filled(first.begin(), first.end() - 1);
+        for (auto [i, j] : links) before[filled[std::max(place_[i], place_[j])]++] = std::min(place_[i], place_[j]);
         begin_.assign(n_ + 1, 0);
+        rows_.reserve(links.size());
         for (int k = 0; k < n_; ++k) {
-            auto& row = before[k];
-            std::sort(row.begin(), row.end());
-            row.erase(std::unique(row.begin(), row.end()), row.end());
-            rows_.insert(rows_.end(), row.begin(), row.end());
+            std::sort(before.begin() + first[k], before.begin() + first[k + 1]);
+            const auto end = std::unique(before.begin() + first[k], before.begin() + first[k + 1]);
+            for (auto row = before.begin() + first[k]; row != end; ++row)
+                if (*row != k) rows_.push_back(*row);
             begin_[k + 1] = int(rows_.size());
         }
         values_.resize(n_ + rows_.size());
