@@ -49,7 +49,7 @@ def test_the_report_holds_settings_metrics_and_agreement() -> None:
     assert report["metrics"]["flipped_faces"] == 0
     assert report["metrics"]["symmetric_dirichlet_mean"] == pytest.approx(1.0)
     assert set(report["network"]) == {"rms_texels", "p99_texels", "chart_agreement", "seam_agreement", "points"}
-    assert set(report["seconds"]) == {"train", "pack", "measure", "export"}
+    assert set(report["seconds"]) == {"train", "pack", "measure", "fit", "export"}
     json.dumps(report, allow_nan=False)
 
 
