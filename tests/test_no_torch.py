@@ -99,3 +99,48 @@ def test_the_whole_runtime_is_looked_at() -> None:
 def test_export_without_onnx_says_how_to_get_it() -> None:
     done = blocked(["flexpara.export.graph.builder"], ("onnx",))
     assert "MissingDependencyError: onnx is missing, export needs it; pip install" in done.stderr
+
+
+UNWRAP = """
+import flexpara
+from flexpara.runtime.samples import make_sample
+flexpara.unwrap(make_sample("cube", resolution=4))
+"""
+NOT_FOR_UNWRAP = ("torch", "moderngl", "glcontext", "OpenGL", "OpenImageIO", "trimesh", "rich", "safetensors")
+AFTER_CHARTS = ("onnx", "onnxruntime", "scipy.optimize", "flexpara.export.assemble", "flexpara.runtime.pack.packing")
+
+
+def test_an_unwrap_loads_no_package_that_it_does_not_use() -> None:
+    pytest.importorskip("igl")
+    assert loaded(UNWRAP, NOT_FOR_UNWRAP) == []
+    assert loaded(UNWRAP, ("igl", "onnxruntime")) == ["igl", "onnxruntime"]
+
+
+def test_what_follows_the_charts_is_not_loaded_before_they_are_looked_for() -> None:
+    pytest.importorskip("igl")
+    begin = "import sys, flexpara.export.whole\n"
+    done = interpret(f"{begin}print(*sorted({set(AFTER_CHARTS)!r} & set(sys.modules)))")
+    assert (done.returncode, done.stdout) == (0, "\n"), done.stderr
+
+
+def test_modules_are_loaded_one_at_a_time_while_there_is_nothing_else_to_do() -> None:
+    pytest.importorskip("igl")
+    code = """
+import sys
+from flexpara.runtime.meanwhile import load_meanwhile, load_next
+assert not load_next()
+load_meanwhile()
+print("scipy.optimize" in sys.modules, load_next(), "scipy.optimize" in sys.modules, "onnx" in sys.modules)
+while load_next():
+    pass
+print(*sorted({names!r} & set(sys.modules)))
+"""
+    done = interpret(code.format(names=set(AFTER_CHARTS)))
+    assert done.stdout.splitlines() == ["False True True False", " ".join(sorted(AFTER_CHARTS))], done.stderr
+
+
+def test_a_package_that_is_needed_after_the_charts_is_missed_before_them() -> None:
+    pytest.importorskip("igl")
+    done = interpret(BLOCK.format(names={"onnxruntime"}) + UNWRAP)
+    assert 'pip install "flexpara[unwrap]"' in done.stderr.splitlines()[-1]
+    assert "chart_surface" not in done.stderr
