@@ -119,7 +119,7 @@ def test_progress_sees_every_stage_of_unwrapping_and_saving(tmp_path: Path) -> N
 
     result = flexpara.unwrap((VERTICES, FACES), size=64, progress=progress)
     result.save(tmp_path, maps=(), preview=False, progress=progress)
-    assert list(dict.fromkeys(stages)) == ["train", "pack", "measure", "export", "write"]
+    assert list(dict.fromkeys(stages)) == ["train", "pack", "measure", "fit", "export", "write"]
 
 
 def test_options_are_checked_before_anything_is_read(tmp_path: Path, instant_training: list[Surface]) -> None:

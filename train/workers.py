@@ -52,9 +52,12 @@ class Copy(NamedTuple):
     results: int
 
 
-def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+def parallel_map(
+    function: Callable[[Item], Result], items: Sequence[Item], effort: Callable[[Item], float] | None = None
+) -> list[Result]:
     """``[function(item) for item in items]`` on all cores this process may use.
 
+    ``effort``: what an item may take; those of most are begun first, so that no core has one left when others are done.
     ``function`` must not use torch (its threads don't survive a fork); results must be picklable.
 
     Raises: what the function raises; FinishError when a copy was killed.
@@ -63,7 +66,8 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
     if helpers < 1 or len(items) > MOST or _sharing:
         return [function(item) for item in items]
     _sharing.append(True)
-    tickets = ticket_pipe(len(items))
+    order = range(len(items)) if effort is None else sorted(range(len(items)), key=lambda n: -effort(items[n]))
+    tickets = ticket_pipe(order)
     copies: list[Copy] = []
     try:
         copies += [forked(function, items, tickets) for _ in range(helpers)]
@@ -90,7 +94,7 @@ class Beside(Generic[Result]):
         self._copy: Copy | None = None
         self._process = os.getpid()
         if available_cores() > 1 and not _sharing:
-            tickets = ticket_pipe(1)
+            tickets = ticket_pipe([0])
             self._copy = forked(lambda _: alone(work), [None], tickets)
             os.close(tickets)
 
@@ -135,10 +139,10 @@ def available_cores() -> int:
     return core_count() if sys.platform == "linux" else 1
 
 
-def ticket_pipe(count: int) -> int:
-    """The reading end of a pipe with one ticket for each item: whoever is free takes the next."""
+def ticket_pipe(order: Sequence[int]) -> int:
+    """The reading end of a pipe with one ticket for each item, in this order: whoever is free takes the next."""
     reading, writing = os.pipe()
-    os.write(writing, b"".join(TICKET.pack(number) for number in range(count)))
+    os.write(writing, b"".join(TICKET.pack(number) for number in order))
     os.close(writing)
     return reading
 

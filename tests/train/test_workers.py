@@ -26,6 +26,19 @@ def test_results_come_in_the_order_of_the_items() -> None:
 
 
 @pytest.mark.usefixtures("cores")
+def test_results_keep_the_order_of_the_items_whatever_is_begun_first() -> None:
+    assert parallel_map(lambda n: n * n, range(50), float) == [n * n for n in range(50)]
+
+
+def test_what_takes_longest_is_begun_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "available_cores", lambda: 2)
+    begun: list[int] = []
+    parallel_map(begun.append, range(50), lambda n: -abs(n - 20))
+    assert begun == sorted(begun, key=lambda n: abs(n - 20))
+    assert begun
+
+
+@pytest.mark.usefixtures("cores")
 def test_no_items_give_no_results() -> None:
     assert parallel_map(abs, []) == []
 

@@ -134,7 +134,8 @@ class Straightening:
             for key, ids in zip(owner, sides, strict=True):
                 wrong[ids] = np.maximum(wrong[ids], ids is not largest[key])
             return None, wrong
-        made = parallel_map(lambda job: self.piece(*job, seam), list(zip(owner, sides, strict=True)))
+        jobs = list(zip(owner, sides, strict=True))
+        made = parallel_map(lambda job: self.piece(*job, seam), jobs, lambda job: len(job[1]))
         found = self.search.emptied()
         for key, ids, (name, laid) in zip(owner, sides, made, strict=True):
             self.known[key, name] = ids, laid

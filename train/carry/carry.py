@@ -48,7 +48,8 @@ def laid_on(search: Search, piece: NDArray[np.int64], label: NDArray[np.int64], 
     """
     rows = [np.flatnonzero(piece == number) for number in range(int(piece.max()) + 1)]
     jobs = [(ids, sources[int(np.bincount(label[ids]).argmax())]) for ids in rows]
-    for (ids, source), ways in zip(jobs, parallel_map(lambda job: carried_ways(search, *job), jobs), strict=True):
+    found = parallel_map(lambda job: carried_ways(search, *job), jobs, lambda job: len(job[0]))
+    for (ids, source), ways in zip(jobs, found, strict=True):
         carry_piece(search, ids, source, ways)
     search.place_loose()
     return search

@@ -136,7 +136,8 @@ def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: t
     if starts.late() or len(first.pieces) > starts.config.start.crowded:
         return [first.begin(starts.late)]
     begun = [lambda: first, *(partial(laid_out, surface, graph, label, starts.config) for label in labels[1:])]
-    return parallel_map(lambda begin: begin().begin(starts.late), begun)
+    numbers = range(len(labels))
+    return parallel_map(lambda n: begun[n]().begin(starts.late), numbers, lambda n: float(labels[n].max()))
 
 
 def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
