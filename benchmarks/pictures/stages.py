@@ -1,7 +1,9 @@
-"""One mesh on its way: the surface, the proxy, a start, the search's charts, those of the surface, the page."""
+"""One mesh on its way, from the surface to the ONNX file and a map: a panel for each stage."""
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,25 +16,26 @@ from flexpara.bake.pictures.preview import INK, PAPER, checker_cells, layout, sh
 from flexpara.bake.raster.context import open_context
 from flexpara.bake.seams.seamcheck import seam_edges
 from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.sessions.agreement import surface_points
 from flexpara.train.charts import charts as chart_module
 from flexpara.train.config import FinishConfig
 from flexpara.train.search.labels import dual_graph
 from flexpara.train.search.starts import clusters
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     from flexpara.runtime.geometry.topology import EdgeTable
-    from flexpara.runtime.mesh import Surface
+    from flexpara.runtime.mesh import Asset, Atlas, Surface
     from flexpara.train.search.search import Search
 
-PANEL = 300
+PANEL, INNER = 300, 264
+"""Pixels of a panel, and of a page in it."""
+POINTS = 200_000
 
 
 def stages(models: Path) -> None:
-    """Six panels of the bunny."""
+    """Eight panels of the bunny."""
     config = FinishConfig()
     kept: list[Search] = []
     original = chart_module.best_search
@@ -65,7 +68,30 @@ def stages(models: Path) -> None:
             draw(context, camera, charted, seams, pixels=PANEL, paper=PAPER),
             draw(context, *layout(atlas, colors), pixels=PANEL, paper=PAPER),
         ]
-    save("stages", np.concatenate([np.concatenate(views[:3], axis=1), np.concatenate(views[3:], axis=1)]))
+    views += [answers(result.onnx, atlas, colors), occlusion(atlas, asset)]
+    save("stages", np.concatenate([np.concatenate(views[:4], axis=1), np.concatenate(views[4:], axis=1)]))
+
+
+def answers(onnx: bytes, atlas: Atlas, colors: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Each point of the surface at the uv, and in the colour (k, 3) of the chart, that the ONNX file gives it."""
+    points, *_ = surface_points(atlas, POINTS, np.random.default_rng(0))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "map.onnx"
+        path.write_bytes(onnx)
+        found = flexpara.runtime.UnwrapSession(path).unwrap(points)
+    panel = np.full((PANEL, PANEL, 3), PAPER, np.float32)
+    column, row = (found.uv * [1.0, -1.0] + [0.0, 1.0]).T * INNER + 0.5 * (PANEL - INNER)
+    panel[row.astype(np.int64), column.astype(np.int64)] = colors[found.chart]
+    return panel
+
+
+def occlusion(atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
+    """The map ao, small."""
+    texture = flexpara.bake.bake(atlas, asset, ["ao"], size=INNER)["ao"]
+    panel = np.full((PANEL, PANEL, 3), PAPER, np.float32)
+    inside = slice((PANEL - INNER) // 2, (PANEL - INNER) // 2 + INNER)
+    panel[inside, inside] = np.atleast_3d(texture.pixels)
+    return panel
 
 
 def borders(table: EdgeTable, label: NDArray[np.int64]) -> NDArray[np.int64]:
