@@ -35,9 +35,9 @@ class Rows:
         """Read them."""
         self.data.foreach_get("uv", values)
 
-    def foreach_set(self, _name: str, values: Any) -> None:
+    def foreach_set(self, values: Any) -> None:
         """Write them."""
-        self.data.foreach_set("uv", values)
+        self.data.foreach_set("uv", values.reshape(-1))
 
 
 def enabled(program: str) -> None:
@@ -46,6 +46,8 @@ def enabled(program: str) -> None:
     if bpy.app.version < (3, 5, 0):
         bpy.types.MeshUVLoopLayer.uv = property(lambda layer: Rows(layer.data))
     extension = importlib.import_module(EXTENSION.name)
+    if bpy.app.version < (3, 5, 0):
+        extension.meshes.set_uv = lambda data, name, values: Rows(data.uv_layers[name].data).foreach_set(values)
     for panel in (extension.interface.FLEXPARA_PT_image, extension.interface.FLEXPARA_PT_view):
         panel.bl_order = 0
     extension.register()

@@ -1,7 +1,7 @@
 """Reports: size, seconds until a browser has drawn one, and a picture: `python -m benchmarks.report MESH… -o OUT`.
 
-Each mesh is unwrapped with a normal map and `--report`; the last line compares all of them.  OUT receives MESH.webp and
-`compared.webp`.  Chromium draws in software here.
+Each mesh is unwrapped with a normal map and `--report`; the last line compares all of them.  OUT receives MESH.webp,
+MESH-dark.webp and `compared.webp`.  Chromium draws in software here.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def browser_module() -> Any:
 
 
 def opened(report: Path, picture: Path, folder: Path) -> float:
-    """Seconds from opening the file until it is drawn; the window as a picture."""
+    """Seconds from opening the file until it is drawn; the window as a picture, light and dark."""
     browser = browser_module()
     with browser.started(browser.find_browser(), folder / f"profile-{report.stem}") as page:
         page.open("about:blank", WIDTH, HEIGHT)
@@ -44,13 +44,15 @@ def opened(report: Path, picture: Path, folder: Path) -> float:
         page.call("Page.navigate", url=report.resolve().as_uri())
         page.wait(DRAWN)
         seconds = time.perf_counter() - start
-        time.sleep(1.0)
-        page.screenshot(folder / "shot.png")
+        for scheme, name in (("light", picture), ("dark", picture.with_stem(f"{picture.stem}-dark"))):
+            page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            time.sleep(1.0)
+            page.screenshot(folder / "shot.png")
+            image = Image.open(folder / "shot.png").convert("RGB")
+            image.thumbnail((900, 900), Image.Resampling.LANCZOS)
+            image.save(name, quality=QUALITY, method=6)
         asked = [address for address in page.requests if not address.startswith(("file:", "data:", "blob:", "about:"))]
         assert (asked, page.complaints) == ([], []), (asked, page.complaints)
-    image = Image.open(folder / "shot.png").convert("RGB")
-    image.thumbnail((900, 900), Image.Resampling.LANCZOS)
-    image.save(picture, quality=QUALITY, method=6)
     return seconds
 
 

@@ -83,10 +83,15 @@ def write_uv(entry: Chosen, uv: NDArray[np.float32], answered: NDArray[np.bool_]
     layer = data.uv_layers.active or data.uv_layers.new(name=UV_NAME)
     values, loops = column(layer.uv, "vector", np.float32, 2), np.flatnonzero(entry.loops)
     values[loops[answered]] = uv[answered]
-    layer.uv.foreach_set("vector", values.reshape(-1))
+    set_uv(data, layer.name, values)
     if mark_seams:
         mark(entry, uv)
     data.update()
+
+
+def set_uv(data: Any, name: str, values: NDArray[np.float32]) -> None:
+    """Write the uv (l, 2) of a layer as an attribute: what is written by layer.uv, undo has too, and can't undo."""
+    data.attributes[name].data.foreach_set("vector", values.reshape(-1))
 
 
 def mark(entry: Chosen, uv: NDArray[np.float32]) -> NDArray[np.int64]:
