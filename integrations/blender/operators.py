@@ -142,6 +142,7 @@ class FLEXPARA_OT_unwrap(InProcess, UnwrapSettings, bpy.types.Operator):
         if self.time_budget > 0.0:
             numbers["time-budget"] = self.time_budget
         options = [word for name, value in numbers.items() for word in (f"--{name}", str(value))]
+        options += ["--seams", self.seams]
         kept = np.concatenate([meshes.marked_edges(entry) for entry in self.chosen])
         if self.keep_seams and len(kept):
             exchange.write_cuts(kept, folder / "cuts.txt")

@@ -34,6 +34,14 @@ class UnwrapSettings:
     keep_seams: bpy.props.BoolProperty(
         name="Keep Seams", default=False, description="Edges marked as seams before stay seams; new ones are added"
     )
+    seams: bpy.props.EnumProperty(
+        name="Seams",
+        items=[
+            ("short", "Short", "Anywhere, as short as pays"),
+            ("hidden", "Hidden", "Where the surface sees less of the sky, though they are longer for it"),
+            ("crease", "Creases", "Along creases, though they are longer for it"),
+        ],
+    )
     protect: bpy.props.StringProperty(
         name="Protect", description="Vertex group whose faces seams keep away from, at ten times the price"
     )

@@ -258,6 +258,7 @@ def sidebar(extension: Any) -> list[str]:
     type("Panel", (extension.interface.Sidebar,), {"layout": layout})().draw(bpy.context)
     lines, asked = layout.lines, layout.asked
     assert "Charts: 3" in lines
+    assert "Seams: short" in lines
     assert "[Unwrap with flexpara]" in lines
     assert asked[0].charts == 3
     assert any(line.startswith("Seam length: ") for line in lines), lines
@@ -271,7 +272,8 @@ def in_background(operators: Any) -> None:
     things.picked(bpy.context.object)
     kind = operators.FLEXPARA_OT_unwrap
     settings = {"charts": 8, "max_stretch": 0.0, "time_budget": 0.0, "size": 256, "padding": 2, "seed": 0}
-    settings |= {"selected_only": False, "keep_seams": False, "protect": "", "mark_seams": True}
+    settings |= {"selected_only": False, "keep_seams": False, "seams": "short", "protect": ""}
+    settings |= {"mark_seams": True}
     methods = {name: getattr(kind, name) for name in ("words", "take", "with_uv")}
     told: list[Any] = []
     command, shown = type("Unwrap", (operators.InProcess,), methods | settings)(), window.Window()
