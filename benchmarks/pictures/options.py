@@ -29,8 +29,10 @@ if TYPE_CHECKING:
 
 SIZE = 512
 """Texels of the atlases that are shown: paddings are seen."""
-ZOOM, COARSE = 18, 40
+ZOOM, COARSE = 30, 24
 """Pixels of a texel, and texels of an atlas, where texels are shown."""
+RECTANGLES = ((1.0, 0.62), (0.5, 0.37), (0.83, 0.21), (0.31, 0.29))
+"""Their sides."""
 RUMP = 0.45
 """Spot's hind quarters lie behind this z."""
 SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
@@ -47,7 +49,7 @@ SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
     "padding": ("spot", ({"padding": 1}, {"padding": 8}, {"padding": 32})),
     "rotation": ("fandisk", ({"rotation": "off"}, {"rotation": "90"}, {"rotation": "any"})),
     "stack": ("brackets.ply", ({"stack": "off"}, {"stack": "identical"}, {"stack": "mirrored"})),
-    "pages": ("cow", ({"pages": 3},)),
+    "pages": ("suzanne", ({"pages": 3},)),
     "atlas": ("two.glb", ({"atlas": "mesh"},)),
 }
 """Picture: mesh, and the settings that are set side by side; what ends in a suffix is made by `Inputs`."""
@@ -183,10 +185,12 @@ def tile(atlas: Atlas, chosen: NDArray[np.bool_], page: int) -> Atlas:
 
 
 def whole_texels(inputs: Inputs) -> None:
-    """Boxes on a coarse page: texels, and the edges of charts among them."""
-    box = trimesh.creation.box((1.0, 0.62, 0.37))
-    path = inputs.folder / "box.ply"
-    box.export(path)
+    """Rectangles on a coarse page: texels, and the edges of charts among them."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    vertices = np.concatenate([corners * [*side, 1.0] + [0.0, 0.0, k] for k, side in enumerate(RECTANGLES)])
+    faces = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(len(RECTANGLES))])
+    path = inputs.folder / "rectangles.ply"
+    trimesh.Trimesh(vertices, faces, process=False).export(path)
     images = []
     for whole in (False, True):
         atlas = flexpara.unwrap(path, size=COARSE, padding=1, whole_texels=whole).atlas

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from .square import Square
 
 
+ALIKE = 1e-9
+"""Share by which densities may differ and count as one: sums in another order round in another way."""
+
+
 def pack_square(
     asset: Asset, charts: Charts, square: Square, seed: int = 0, config: PackConfig | None = None
 ) -> Packed:
@@ -36,13 +40,14 @@ def pack_square(
         return packed
     most = packed.report["chart_scale"] * square.size
     wanted = square.texel_density
-    if wanted > most:
+    if wanted > (1.0 + ALIKE) * most:
         size = 2 ** math.ceil(math.log2(square.size * wanted / most))
         raise InputError(
             f"texel-density is {wanted:g}, expected at most {most:.4g} in {square.size} texels; pass --size {size} or "
             "a lower density"
         )
-    found = _filled_part(asset, charts, square, packed, seed, loose)
+    wanted = min(wanted, most)
+    found = _filled_part(asset, charts, square._replace(texel_density=wanted), packed, seed, loose)
     return _shrunk(asset, charts, square, found, wanted / (found.report["chart_scale"] * square.size), config)
 
 

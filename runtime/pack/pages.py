@@ -12,6 +12,7 @@ import numpy as np
 from ..geometry.triangles import signed_areas
 from .asked import faces_of, pack_asked, some_charts
 from .config import PackConfig
+from .density import ALIKE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 ACROSS = 10
 """Pages in a row."""
-ALIKE = 1e-9
-"""Share by which densities may differ and count as one."""
 
 
 class Paged(NamedTuple):

@@ -45,6 +45,14 @@ def test_a_density_that_does_not_fit_names_the_size_that_does() -> None:
     pack_square(asset, charts, Square(4096, 2, 1000.0))
 
 
+def test_the_density_that_just_fits_is_met_whichever_way_it_was_rounded() -> None:
+    """As pages ask for it: the density of the fullest, summed in another order."""
+    asset, charts = squares([1.0, 2.0])
+    most = pack_square(asset, charts, Square(256, 2)).report["chart_scale"] * 256
+    packed = pack_square(asset, charts, Square(256, 2, float(np.nextafter(most, np.inf))))
+    assert packed.report["chart_scale"] * 256 == pytest.approx(most, rel=1e-9)
+
+
 def test_without_a_density_charts_fill_the_atlas() -> None:
     asset, charts = squares([1.0])
     packed = pack_square(asset, charts, Square(100, 2))
