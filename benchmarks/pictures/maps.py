@@ -37,6 +37,7 @@ MAPS = (
     "distortion",
 )
 SIGNED = ("normal", "normal-object", "bent-normal", "bent-normal-object")
+STRIPES = 50.0
 BACKGROUND = "#204060"
 FEW = RaySettings(count=2)
 """So few that noise is seen."""
@@ -59,7 +60,13 @@ def shown_maps() -> list[Shown]:
     found += [Shown("normal-format", "normal", {"normal_format": "directx"}), Shown("rays", few)]
     found += [Shown("denoise", few, {"denoise": True})]
     found += [Shown(f"size-{size}", "uv-checker", {"size": size}, 0.999) for size in (64, 256)]
-    return found + [Shown(f"samples-{count}", "uv-checker", {"samples": count, "size": 256}, 0.3) for count in (1, 16)]
+    return found + [Shown(f"samples-{count}", stripes, {"samples": count, "size": 128}, 0.4) for count in (1, 16)]
+
+
+def stripes(positions: NDArray[np.float32], normals: NDArray[np.float32], faces: NDArray[np.int64]) -> NDArray[Any]:
+    """A map with edges everywhere: slanted stripes through the surface."""
+    del normals, faces
+    return np.where(np.sin(STRIPES * positions @ np.array([0.3, 1.0, 0.2])) > 0.0, 0.1, 0.9).astype(np.float32)
 
 
 def maps(models: Path) -> None:
@@ -67,8 +74,11 @@ def maps(models: Path) -> None:
     result = flexpara.unwrap(models / "spot.obj", size=SIZE)
     for shown in shown_maps():
         settings = {"size": SIZE, **shown.settings}
-        texture, *_ = flexpara.bake.bake(result.atlas, result.asset, [shown.wanted], **settings).values()
-        signed = (shown.wanted if isinstance(shown.wanted, str) else shown.wanted.name) in SIGNED
+        source: tuple[Any, ...] = (result.asset, [shown.wanted])
+        if shown.wanted is stripes:
+            source = ({"stripes": stripes},)
+        texture, *_ = flexpara.bake.bake(result.atlas, *source, **settings).values()
+        signed = shown.wanted in SIGNED
         image = Image.fromarray(seen(texture, signed=signed))
         side = image.width * shown.crop
         low, high = (image.width - side) / 2.0, (image.width + side) / 2.0
@@ -78,8 +88,8 @@ def maps(models: Path) -> None:
         )
         print(f"map-{shown.name}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        written = result.save(folder, maps=("normal",), background=BACKGROUND)
-        image = Image.open(next(path for path in written if path.name.endswith("_normal.png"))).convert("RGB")
+        written = result.save(folder, maps=("chart",), background=BACKGROUND)
+        image = Image.open(next(path for path in written if path.name.endswith("_chart.png"))).convert("RGB")
     image.resize((PANEL, PANEL), Image.Resampling.LANCZOS).save(
         FOLDER / "map-background.webp", quality=QUALITY, method=6
     )
@@ -88,7 +98,7 @@ def maps(models: Path) -> None:
 def seen(texture: Texture, *, signed: bool) -> NDArray[np.uint8]:
     """(h, w, 3) as one sees it; signed: numbers from −1 to 1."""
     pixels = np.atleast_3d(texture.pixels)[..., :3].astype(np.float64)
-    low, high = min(float(pixels.min()), 0.0), float(pixels.max())
+    low, high = min(float(np.quantile(pixels, 0.002)), 0.0), float(np.quantile(pixels, 0.998))
     pixels = 0.5 * (pixels + 1.0) if signed else (pixels - low) / max(high - low, 1e-9)
     if texture.encoding == "srgb":
         pixels = srgb_bytes_from_linear(pixels.astype(np.float32)) / 255.0
