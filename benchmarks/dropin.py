@@ -144,6 +144,7 @@ def main() -> None:
     parser.add_argument("meshes", nargs="*", type=Path)
     parser.add_argument("--level-sets", nargs="*", type=int, default=[])
     parser.add_argument("--budget", type=float, default=60.0, help="seconds for flexpara.xatlas.settings.time_budget")
+    parser.add_argument("--tools", nargs="*", choices=TOOLS, default=TOOLS, help="those that are run, by default both")
     parser.add_argument("--kept", type=Path, help="a file that keeps each line as soon as it is known")
     for name in ("--run", "--given", "--answer"):
         parser.add_argument(name)
@@ -155,7 +156,7 @@ def main() -> None:
     kept = Kept(asked.kept)
     with tempfile.TemporaryDirectory() as folder:
         for mesh in given_meshes(asked.meshes, asked.level_sets):
-            for tool in TOOLS:
+            for tool in asked.tools:
                 name = f"{mesh.name} {len(mesh.faces)} {tool}" + f" {asked.budget:g} s" * (tool != "xatlas")
                 print(kept.line(name, partial(row, tool, mesh, asked.budget, Path(folder))), flush=True)
 
