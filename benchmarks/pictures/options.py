@@ -13,12 +13,14 @@ from PIL import Image, ImageDraw
 from trimesh.visual import TextureVisuals
 
 import flexpara
-from benchmarks.pictures.sheets import FOLDER, PANEL, QUALITY, Column, foot, save, sheet
+from benchmarks.pictures.sheets import FOLDER, PANEL, QUALITY, WIDTH, Column, foot, save, sheet
+from flexpara.__main__ import main as command
 from flexpara.bake.colors.color import chart_colors, srgb_bytes_from_linear
 from flexpara.bake.pictures.canvas import draw
 from flexpara.bake.pictures.preview import PAPER, layout
 from flexpara.bake.raster.context import open_context
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry.proxy import simplified
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,6 +35,8 @@ ZOOM, COARSE = 30, 24
 """Pixels of a texel, and texels of an atlas, where texels are shown."""
 RECTANGLES = ((1.0, 0.62), (0.5, 0.37), (0.83, 0.21), (0.31, 0.29))
 """Their sides."""
+LOW = 2500
+"""Faces of a coarse bunny."""
 RUMP = 0.45
 """Spot's hind quarters lie behind this z."""
 SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
@@ -211,5 +215,34 @@ def whole_texels(inputs: Inputs) -> None:
     print("whole-texels", flush=True)
 
 
-OTHERS: Mapping[str, Callable[[Inputs], None]] = {"density": density, "udim": udim, "whole-texels": whole_texels}
+def high(inputs: Inputs) -> None:
+    """Normals of a coarse bunny alone, from the fine one, and with rays that don't reach it."""
+    fine = inputs.mesh("bunny")
+    coarse = simplified(flexpara.load(fine).surface, LOW)
+    low = inputs.folder / "low.ply"
+    trimesh.Trimesh(coarse.vertices, coarse.faces, process=False).export(low)
+    assert (
+        command(["unwrap", str(low), "-o", str(inputs.folder), "--size", str(SIZE), "--maps", "none", "--quiet"]) == 0
+    )
+    panels = []
+    for words in ("", f"--high {fine} --cage 0.02", f"--high {fine} --cage 0.0005"):
+        out = inputs.folder / f"maps{len(panels)}"
+        baked = ["bake", str(inputs.folder / "low.glb"), "-o", str(out), "--maps", "normal", *size]
+        assert command([*baked, *words.split()]) == 0
+        image = Image.open(out / "low_normal.png").convert("RGB").resize((PANEL, PANEL), Image.Resampling.LANCZOS)
+        line = words.replace(str(fine), fine.name) or "the coarse mesh alone"
+        below = Image.fromarray(srgb_bytes_from_linear(foot(line)))
+        panels.append(np.concatenate([np.asarray(image), np.asarray(below)]))
+    image = Image.fromarray(np.concatenate(panels, axis=1))
+    image.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
+    image.save(FOLDER / "high.webp", quality=QUALITY, method=6)
+    print("high", flush=True)
+
+
+OTHERS: Mapping[str, Callable[[Inputs], None]] = {
+    "density": density,
+    "udim": udim,
+    "whole-texels": whole_texels,
+    "high": high,
+}
 """Pictures that are no columns of unwraps."""
