@@ -216,14 +216,13 @@ def whole_texels(inputs: Inputs) -> None:
 
 
 def high(inputs: Inputs) -> None:
-    """Normals of a coarse bunny alone, from the fine one, and with rays that don't reach it."""
+    """Normals of a coarse bunny alone, from the fine one, and with a close cage."""
     fine = inputs.mesh("bunny")
     coarse = simplified(flexpara.load(fine).surface, LOW)
     low = inputs.folder / "low.ply"
     trimesh.Trimesh(coarse.vertices, coarse.faces, process=False).export(low)
-    assert (
-        command(["unwrap", str(low), "-o", str(inputs.folder), "--size", str(SIZE), "--maps", "none", "--quiet"]) == 0
-    )
+    size = ["--size", str(SIZE), "--quiet"]
+    assert command(["unwrap", str(low), "-o", str(inputs.folder), "--maps", "none", *size]) == 0
     panels = []
     for words in ("", f"--high {fine} --cage 0.02", f"--high {fine} --cage 0.0005"):
         out = inputs.folder / f"maps{len(panels)}"
