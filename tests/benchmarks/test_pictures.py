@@ -24,7 +24,7 @@ ELSEWHERE |= {"keep_islands": "keep-seams", "cage": "high"}
 """Options whose picture has another name, or stands beside others."""
 NOT_SEEN = {"select", "preset", "time_budget", "texel_density", "fields", "uv_set", "match_names"}
 """Which meshes, which method, how long, whose uv and parts, and a number of texels that says itself what is seen."""
-AWAITED = {"start", "importance", "symmetry", "energy"}
+AWAITED = {"start", "importance", "importance_density", "symmetry", "energy"}
 """Options that are being built: each leaves this list with its picture."""
 STORED = {"target", "texture_format", "layers", "exr_bits", "exr_compression"}
 """How files are named and stored."""
