@@ -223,7 +223,9 @@ class FinishConfig:
     tries: int = 150
     """Merges flattened in a search after which it looks at the most promising alone."""
     most_tries: int = 300
-    """Merges flattened in a search after which none is made any more that raises the objective."""
+    """Merges flattened in a search after which none is made any more that raises the objective …"""
+    most_faces_tried: int = 200_000
+    """… and faces of them, which on a large mesh are reached first."""
     few_rounds: int = 2
     """As ``rounds``, for a part of small share."""
     most_excess: float = 0.05

@@ -57,6 +57,7 @@ class Search(State):
         self.tried: dict[Pair, Trimmed | None] = {}
         self.foretold: dict[Pair, tuple[float, float]] = {}
         self.settled: set[int] = set()
+        self.flattened = 0
 
     def emptied(self) -> Self:
         """A search of the same surface without pieces."""
@@ -94,6 +95,8 @@ class Search(State):
         if np.isfinite(least) and len(untried) > patience:
             ranked = ranked[: untried[patience]]
         for at in range(0, len(ranked), self.config.looks):
+            if np.isinf(least) and self.is_tired():
+                return None
             block = ranked[at : at + self.config.looks]
             self.try_merges([pair for _, pair, _ in block])
             valid = [
@@ -110,6 +113,11 @@ class Search(State):
         """Flatten pairs of pieces as one; each pair once."""
         new = [pair for pair in pairs if pair not in self.tried]
         self.tried.update(zip(new, parallel_map(self.merged, new), strict=True))
+        self.flattened += sum(len(self.pieces[key].ids) for pair in new for key in pair)
+
+    def is_tired(self) -> bool:
+        """True once so many merges, or merges of so many faces, were flattened that none may raise the objective."""
+        return len(self.tried) > self.config.most_tries or self.flattened > self.config.most_faces_tried
 
     def merged(self, pair: Pair) -> Trimmed | None:
         """The pair as one piece, less the flaps of it that lie over the rest; None where it overlaps by more."""
@@ -187,8 +195,7 @@ class Search(State):
     def merge(self, least: float, down_to: int, late: Late = never) -> None:
         """Merges that gain more than ``least``, while there are more than ``down_to`` pieces and it is not ``late``."""
         while len(self.pieces) > down_to and not late():
-            tired = np.isinf(least) and len(self.tried) > self.config.most_tries
-            best = None if tired else self.best_merge(least)
+            best = self.best_merge(least)
             if best is None or (best.gain < 0.0 and self.energy() - best.gain > self.config.most_excess):
                 return
             self.apply_merge(best, least)
