@@ -71,13 +71,17 @@ class Materials:
         self.original = copy.deepcopy(self.editing.tree.get("materials", []))
 
     def number(self, index: int | None, baked: Baked, unread: frozenset[str]) -> int | None:
-        """The material to use in place of index.  unread: slots whose picture could not be read, which stay."""
+        """The material to use in place of index.  unread: slots whose picture could not be read, which stay.
+
+        A primitive without one gets glTF's own default by name: trimesh passes over uv of a primitive without material.
+        """
         key = (index, baked.name)
         if key not in self.known:
-            if index is None and not baked.textures:
+            plain = index is None and not baked.textures
+            if plain and not baked.moved:  # further uv sets leave materials as they are
                 return None
             source = {"name": "material"} if index is None else self.original[index]
-            self.known[key] = self._place(index, rebaked(source, baked, unread))
+            self.known[key] = self._place(index, source if plain else rebaked(source, baked, unread))
         return self.known[key]
 
     def _place(self, index: int | None, entry: dict[str, Any]) -> int:
