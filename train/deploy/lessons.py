@@ -121,13 +121,13 @@ def face_slopes(triangles: NDArray[np.float64], values: NDArray[np.float64]) -> 
     Zero for triangles too thin to say.
     """
     edges, ahead = triangles[:, 1:] - triangles[:, :1], values[:, 1:] - values[:, :1]
-    gram = np.einsum("fid,fjd->fij", edges, edges)
-    determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] * gram[:, 1, 0]
-    thin = determinant <= 1e-12 * (gram[:, 0, 0] + gram[:, 1, 1]) ** 2
-    gram[thin] = np.eye(2)
-    slopes = np.einsum("fim,fid->fmd", ahead, np.linalg.solve(gram, edges))
-    slopes[thin] = 0.0
-    return slopes
+    first, second = edges[:, 0], edges[:, 1]
+    a, b, c = (np.einsum("fd,fd->f", *pair) for pair in ((first, first), (first, second), (second, second)))
+    determinant = a * c - b * b
+    thin = determinant <= 1e-12 * (a + c) ** 2
+    scale = np.where(thin, 0.0, 1.0 / np.where(thin, 1.0, determinant))[:, None]
+    dual = np.stack([c[:, None] * first - b[:, None] * second, a[:, None] * second - b[:, None] * first], axis=1)
+    return np.einsum("fim,fid->fmd", ahead, scale[:, None] * dual)
 
 
 def _faces_in(
