@@ -19,7 +19,7 @@ from .objective import rank
 from .proof import is_valid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -88,17 +88,18 @@ class Starts:
             return start.counts_small
         return start.counts if self.share >= start.main else start.counts_middle
 
-    def labels(self, surface: Surface, graph: DualGraph, counts: tuple[float, ...]) -> Iterator[NDArray[np.int64]]:
-        """Connected pieces (f,), numbered 0…, of the proxy, one start after the other."""
-        config = self.config
-        if self.scores is not None:
-            points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
-            yield pieces_by_score(self.scores(points), surface.face_areas(), graph, config.labels)
-            return
-        for number, each in enumerate(counts):
-            wanted = max(round(each * self.charts), round(self.handles / config.handles_per_cluster), 1)
-            count = min(wanted, max(len(surface.faces) // config.start.least_faces, 1))
-            yield clusters(surface, graph, count, config, np.random.default_rng([self.seed, number]))
+    def clusters(self, counts: tuple[float, ...], faces: int) -> tuple[int, ...]:
+        """How many clusters each start of a proxy of so many faces has."""
+        least = max(round(self.handles / self.config.handles_per_cluster), 1)
+        most = max(faces // self.config.start.least_faces, 1)
+        return tuple(min(max(round(each * self.charts), least), most) for each in counts)
+
+    def labels(self, surface: Surface, graph: DualGraph, count: int, number: int) -> NDArray[np.int64]:
+        """Connected pieces (f,), numbered 0…, of the proxy, of so many clusters, or by scores: of one of the starts."""
+        if self.scores is None:
+            return clusters(surface, graph, count, self.config, np.random.default_rng([self.seed, number]))
+        points = surface.triangles.mean(axis=1) * self.part.scale + self.part.origin
+        return pieces_by_score(self.scores(points), surface.face_areas(), graph, self.config.labels)
 
 
 def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
@@ -131,13 +132,16 @@ def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: t
 
     Where the first has so many pieces that it takes its time, it is the only one: another would not be much better.
     """
-    labels = list(starts.labels(surface, graph, counts))
-    first = laid_out(surface, graph, labels[0], starts.config)
+    sizes = starts.clusters(counts if starts.scores is None else counts[:1], len(surface.faces))
+
+    def laid(number: int) -> Search:
+        return laid_out(surface, graph, starts.labels(surface, graph, sizes[number], number), starts.config)
+
+    first = laid(0)
     if starts.late() or len(first.pieces) > starts.config.start.crowded:
         return [first.begin(starts.late)]
-    begun = [lambda: first, *(partial(laid_out, surface, graph, label, starts.config) for label in labels[1:])]
-    numbers = range(len(labels))
-    return parallel_map(lambda n: begun[n]().begin(starts.late), numbers, lambda n: float(labels[n].max()))
+    begun = [lambda: first, *(partial(laid, number) for number in range(1, len(sizes)))]
+    return parallel_map(lambda n: begun[n]().begin(starts.late), range(len(sizes)), lambda n: sizes[n])
 
 
 def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
