@@ -78,3 +78,15 @@ def test_growth_is_seen() -> None:
     assert not soak.verdict(leaking)[1]
     handles = [soak.Reading("unwrap", number, 10**8, 9 + number, 0) for number in range(100)]
     assert not soak.verdict(handles)[1]
+
+
+def test_objects_of_opengl_that_nobody_released_are_counted() -> None:
+    context_of = pytest.importorskip("flexpara.bake.raster.context")
+    with context_of.open_context() as context:
+        context.buffer(b"four").release()
+    before = soak.opengl_objects()
+    assert before > 0
+    with context_of.open_context() as context:
+        context.buffer(b"four")  # forgotten, not released
+    assert soak.opengl_objects() == before + 1
+    context_of.release_idle()
