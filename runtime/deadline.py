@@ -50,7 +50,10 @@ class Deadline:
 
 @contextmanager
 def interrupts_ask(deadline: Deadline, note: Callable[[str], None]) -> Iterator[None]:
-    """Within this, the first Ctrl-C asks for what there is, and says so; the second interrupts, as ever."""
+    """Within this, the first Ctrl-C asks for what there is, and says so; the second interrupts, as ever.
+
+    Where interrupts are held back, they are let in for as long: one that came before asks at once.
+    """
     if threading.current_thread() is not threading.main_thread():  # signals are its own
         yield
         return
@@ -62,7 +65,31 @@ def interrupts_ask(deadline: Deadline, note: Callable[[str], None]) -> Iterator[
         note("interrupted: ending with the best charts so far; interrupt again to stop at once")
 
     before = signal.signal(signal.SIGINT, handle)
+    held_back = let_in()
     try:
         yield
     finally:
+        if held_back:
+            hold_back()
         signal.signal(signal.SIGINT, before)
+
+
+def hold_back() -> bool:
+    """Let interrupts wait, those of threads and processes that are started too; whether they did already."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        return False
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def let_in() -> bool:
+    """The opposite; whether they were held back."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return False
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def drop_waiting() -> None:
+    """Forget an interrupt that waits."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -19,6 +19,7 @@ from selectors import EVENT_READ, DefaultSelector
 from typing import TYPE_CHECKING, Any
 
 from ..cores import LIMIT
+from ..deadline import hold_back, let_in
 from ..files import sweep
 from ..runfile import facts_of
 
@@ -166,15 +167,13 @@ class Worker:
 
 @contextmanager
 def no_interrupts() -> Iterator[None]:
-    """Processes started within this take no interrupt until they allow it: one would end them as they begin."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Processes started within this take no interrupt until they let one in: it would end them as they begin."""
+    before = hold_back()
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if not before:
+            let_in()
 
 
 def wait_for(workers: list[Worker], seconds: float) -> list[Worker]:

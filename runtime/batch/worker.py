@@ -18,6 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..deadline import drop_waiting, hold_back
 from ..errors import DiskFullError, FlexparaError
 from ..heap import give_freed_memory_back, keep_freed_memory
 from ..runfile import Run, run_of
@@ -41,9 +42,7 @@ def main(parent: str, work: str, cores: str) -> None:
     """
     if cores and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(core) for core in cores.split(",")})
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # but while charts are searched, when it asks for what there is
-    if hasattr(signal, "pthread_sigmask"):  # they were held back so far
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    hold_back()  # but while charts are searched, when an interrupt asks for what there is
     keep_freed_memory()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     nothing = os.open(os.devnull, os.O_WRONLY)
@@ -53,6 +52,7 @@ def main(parent: str, work: str, cores: str) -> None:
     module, _, name = work.partition(":")
     function: Callable[[Run], object] = getattr(import_module(module), name)
     for line in sys.stdin:
+        drop_waiting()  # it was meant for the job before
         answers.write(json.dumps(answer(function, run_of(json.loads(line))), allow_nan=False) + "\n")
         answers.flush()
         if resident() > LARGE:  # it counts against the next asset

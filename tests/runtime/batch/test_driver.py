@@ -26,6 +26,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are wat
 NO_LIMITS = Limits()
 WORKS = """
 import json, os, signal, time
+from flexpara.runtime.deadline import Deadline, interrupts_ask
 from flexpara.runtime.errors import DiskFullError, InputError
 
 def write(run):
@@ -47,6 +48,13 @@ def by_name(run):
     if name.startswith("large"):
         keep = b"x" * 400_000_000
         time.sleep(60)
+    if name.startswith("patient"):
+        keep = b"x" * (400_000_000 if name == "patient-large" else 1)
+        time.sleep(2.0)  # it is asked before it listens
+        deadline = Deadline()
+        with interrupts_ask(deadline, lambda _line: None):
+            while not deadline.passed():
+                time.sleep(0.02)
     if name.startswith("refused"):
         raise InputError("value, expected another; correct it")
     if name.startswith("full"):
@@ -127,6 +135,21 @@ def test_what_takes_too_much_is_given_up_and_the_rest_goes_on(
     found = worked(jobs_in(tmp_path, name, "z"), tmp_path, works, limits)
     assert said in found[f"{name}.obj"].error
     assert found["z.obj"].status == "done"
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("patient", Limits(seconds=30.0, hint_seconds=0.05)),
+        ("patient-large", Limits(memory=500_000_000, hint_memory=0.7)),
+    ],
+)
+def test_what_comes_near_a_limit_is_asked_for_what_it_has(
+    name: str, limits: Limits, tmp_path: Path, works: str
+) -> None:
+    found = worked(jobs_in(tmp_path, name, "z"), tmp_path, works, limits)
+    assert {entry.status for entry in found.values()} == {"done"}
+    assert list(found[f"{name}.obj"].files) == [f"{name}.report.json"]
 
 
 @pytest.mark.parametrize(("interrupts", "most"), [(1, 4.0), (2, 1.5)])
