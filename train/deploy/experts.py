@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .sums import node_sums
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -43,11 +45,11 @@ def fit_affine(lesson: Lesson, first: NDArray[np.int64], ridge: float) -> Fitted
     """Ridge regressions of y on x, one a node; ``lesson`` comes node by node, first (k,): where each begins."""
     count = np.diff(first, append=len(lesson.x))
     owner = np.repeat(np.arange(len(first)), count)
-    mean_x, mean_y = (np.add.reduceat(part, first, axis=0) / count[:, None] for part in (lesson.x, lesson.y))
+    mean_x, mean_y = (node_sums(part, first) / count[:, None] for part in (lesson.x, lesson.y))
     x, y = lesson.x - mean_x[owner], lesson.y - mean_y[owner]
-    gram = np.add.reduceat(x[:, :, None] * x[:, None, :], first, axis=0)
-    cross = np.add.reduceat(x[:, :, None] * y[:, None, :], first, axis=0)
-    prior = np.add.reduceat(lesson.slope, first, axis=0) / count[:, None, None]
+    gram = node_sums(x[:, :, None] * x[:, None, :], first)
+    cross = node_sums(x[:, :, None] * y[:, None, :], first)
+    prior = node_sums(lesson.slope, first) / count[:, None, None]
     pull = ridge * np.trace(gram, axis1=1, axis2=2) / x.shape[1] + np.finfo(np.float64).tiny
     pull = pull[:, None, None]
     slope = np.linalg.solve(gram + pull * np.eye(x.shape[1]), cross + pull * prior.transpose(0, 2, 1))

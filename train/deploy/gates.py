@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .sums import node_sums
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -41,7 +43,7 @@ class Spread(NamedTuple):
 
     def total(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums over the rows of each node, (k, …)."""
-        return np.add.reduceat(part, self.first, axis=0)
+        return node_sums(part, self.first)
 
 
 class Chosen(NamedTuple):
@@ -138,7 +140,7 @@ def _error_left(
         return left
     owner = spread.owner
     second = second_side(plane[owner], spread.x + spread.mean[owner])
-    sums = spread.total(features * second[:, None])[known]
+    sums = node_sums(features, spread.first, np.flatnonzero(second))[known]
     rest = total[known] - sums
     error = _squared_error(sums, spread, pull[known]) + _squared_error(rest, spread, pull[known])
     left[known] = np.where((sums[:, 0] > 0.5) & (rest[:, 0] > 0.5), error, np.inf)

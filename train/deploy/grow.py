@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from .experts import Lesson, fit_affine, untorn
 from .gated import GatedExperts, Grid
 from .gates import Chosen, Spread, best_gates, second_side
+from .sums import node_sums
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -204,7 +205,7 @@ def _labels(label: NDArray[np.int64], first: NDArray[np.int64]) -> NDArray[np.in
 def _spread(own: Lesson, first: NDArray[np.int64]) -> Spread:
     """The samples of nodes about their means."""
     count = np.diff(first, append=len(own.x))
-    mean_x, mean_y = (np.add.reduceat(part, first, axis=0) / count[:, None] for part in (own.x, own.y))
+    mean_x, mean_y = (node_sums(part, first) / count[:, None] for part in (own.x, own.y))
     owner = np.repeat(np.arange(len(first)), count)
     return Spread(own.x - mean_x[owner], own.y - mean_y[owner], own.plane, first, mean_x)
 

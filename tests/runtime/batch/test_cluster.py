@@ -199,3 +199,16 @@ def test_what_takes_too_much_on_a_machine_is_given_up_and_a_rerun_without_limit_
     code, told = runs.ended(runs.begun(meshes, tmp_path, *ray, "--retry-failed", environment=TOKEN))
     assert code == 0, told
     assert runs.content(tmp_path) == undisturbed
+
+
+def test_a_cluster_of_its_own_gives_the_same_bytes_and_is_gone_afterwards(
+    runs: Any, meshes: Path, undisturbed: dict[str, object], tmp_path: Path
+) -> None:
+    mark = {MACHINE: f"{tmp_path.name}-local."}
+    code, said = runs.ended(runs.begun(meshes, tmp_path, "--ray", "local", "--workers", "2", environment=mark))
+    assert code == 0, said
+    assert runs.content(tmp_path) == undisturbed
+    machine, limit = Machine(f"{MACHINE}={mark[MACHINE]}".encode(), -1), time.monotonic() + 20.0
+    while machine.processes() and time.monotonic() < limit:
+        time.sleep(0.1)
+    assert machine.processes() == []
