@@ -5,24 +5,28 @@ from __future__ import annotations
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from .extras import requires
 
-PACKAGES = ("scipy.optimize", "onnx", "onnxruntime")
-OURS = (".pack.asked", ".geometry.metrics", ".sessions.agreement", "..export.assemble")
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 _waiting: list[str] = []
 
 
-def load_meanwhile() -> None:
-    """Load them one at a time, whenever there is nothing else to do; whoever needs one sooner imports it.
+def load_meanwhile(packages: Sequence[str], modules: Sequence[str]) -> None:
+    """Load packages, then modules of ours, by full names, one at a time, whenever there is nothing else to do.
+
+    Whoever needs one sooner imports it.
 
     Raises: MissingDependencyError where one of the packages is absent: before charts are found, not after.
     """
     with requires("unwrap"):
-        for name in PACKAGES:
+        for name in packages:
             if find_spec(name) is None:
                 raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-    _waiting[:] = [*PACKAGES, *OURS]
+    _waiting[:] = [*packages, *modules]
 
 
 def load_next() -> bool:
@@ -30,5 +34,5 @@ def load_next() -> bool:
     if not _waiting:
         return False
     with suppress(ImportError):  # said where the module is needed
-        import_module(_waiting.pop(0), __package__)
+        import_module(_waiting.pop(0))
     return True

@@ -127,9 +127,10 @@ def test_modules_are_loaded_one_at_a_time_while_there_is_nothing_else_to_do() ->
     pytest.importorskip("igl")
     code = """
 import sys
-from flexpara.runtime.meanwhile import load_meanwhile, load_next
+from flexpara.export.whole import load_what_follows
+from flexpara.runtime.meanwhile import load_next
 assert not load_next()
-load_meanwhile()
+load_what_follows()
 print("scipy.optimize" in sys.modules, load_next(), "scipy.optimize" in sys.modules, "onnx" in sys.modules)
 while load_next():
     pass

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from ..runtime.extras import requires
 from ..runtime.io.asset.wantedseams import wanted_seams
-from ..runtime.meanwhile import load_meanwhile
 from ..runtime.mesh import Frame
 from .charts.charts import priced
 from .charts.kept import kept_islands
@@ -46,7 +45,6 @@ def train_asset(
 
     Raises: InputError for checkpoints of another run; FinishError (a defect).
     """
-    load_meanwhile()
     if options.keep_islands:
         config = fast_config(options)
         with clock.stage("relax"):
