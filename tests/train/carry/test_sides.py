@@ -9,6 +9,7 @@ pytest.importorskip("igl")
 
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
+from flexpara.train.carry import sides
 from flexpara.train.carry.layout import nearest_faces
 from flexpara.train.carry.sides import CoarseMap, faces_beside, torn_apart
 from flexpara.train.config import FinishConfig
@@ -71,3 +72,17 @@ def test_faces_across_an_open_slit_are_torn_apart() -> None:
     below = int(np.linalg.norm(place - [-0.8, -0.1, 0.0], axis=1).argmin())
     right = [int(np.linalg.norm(place - [0.5, y, 0.0], axis=1).argmin()) for y in (0.1, -0.1)]
     assert torn_apart(mapped, np.array([[above, below], right]), 1.5).tolist() == [True, False]
+
+
+def test_what_is_known_of_near_faces_is_not_looked_for_again_and_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    coarse, fine = sheet(10), sheet(40)
+    source = Flat(coarse, coarse.vertices[:, :2], {})
+    expected = faces_beside(fine, source, CONFIG)
+    near = nearest_faces(fine, coarse, CONFIG.carry)
+    near[::7] = -1
+    asked = []
+    monkeypatch.setattr(sides, "nearest_faces", lambda part, *rest: asked.append(part) or nearest_faces(part, *rest))
+    assert np.array_equal(faces_beside(fine, source, CONFIG, near), expected)
+    assert [len(part.faces) for part in asked] == [len(near[::7])]
