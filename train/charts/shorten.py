@@ -7,6 +7,8 @@ Cuts run straight across the plane, and from there to where edges are shortest. 
 
 from __future__ import annotations
 
+from heapq import heappop, heappush
+from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -52,19 +54,23 @@ class Cut(NamedTuple):
 
 def shortened(surface: Surface, pieces: list[Piece], page: Page, config: FinishConfig) -> list[Piece]:
     """The charts of a part of area 1, those too long for the page cut, where that pays and there may be more."""
-    waiting, done = list(pieces), list[Piece]()
+    waiting, done, number = list[tuple[float, int, Piece]](), list[Piece](), count()
+
+    def wait(piece: Piece) -> None:
+        heappush(waiting, (-page_side(piece.flat.uv), -next(number), piece))  # the longest first, of equals the last
+
+    for piece in pieces:
+        wait(piece)
     while waiting:
-        waiting.sort(key=lambda piece: page_side(piece.flat.uv))
-        piece = waiting.pop()
+        piece = heappop(waiting)[-1]
         room = page.most - len(waiting) - len(done)
         cut = best_cut(piece, page, room, config) if room > 1 else None
         if cut is None:
             done.append(piece)
             continue
         parts = [np.flatnonzero(cut.part == each) for each in range(int(cut.part.max()) + 1)]
-        waiting += [
-            measured(surface, piece.ids[rows], restricted(piece.flat, rows), 1.0, piece.slits) for rows in parts
-        ]
+        for rows in parts:
+            wait(measured(surface, piece.ids[rows], restricted(piece.flat, rows), 1.0, piece.slits))
     return straight_pieces(surface, done, config) if len(done) > len(pieces) else done
 
 
