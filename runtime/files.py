@@ -114,7 +114,8 @@ class OutputFolder:
                 raise ForeignFileError(f"{target} is the input itself, which is never overwritten; choose another -o")
             if not self.force and name not in self._own:
                 raise ForeignFileError(
-                    f"{target} was not written by flexpara; choose another -o, or add --force to replace it"
+                    f"{target} is there, and no report says that flexpara wrote it; choose another -o, or add "
+                    "--force to replace it"
                 )
 
     def write(self, name: str, writer: Callable[[Path], object]) -> None:
