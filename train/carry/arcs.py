@@ -8,6 +8,7 @@ e edges of the surface's table · f faces · lengths in √A.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -87,7 +88,7 @@ class Straightening:
         self.search, self.arcs = search, arcs
         self.plain, self.label = seam_edges(search), search.label()
         self.known: dict[tuple[int, frozenset[int]], tuple[NDArray[np.int64], Laid]] = {}
-        self.failed: set[int] = set()
+        self.failed: Counter[int] = Counter()
 
     def run(self, rounds: int) -> Search:
         """The search with those of the arcs on their new ways that leave every piece valid and do not cost more.
@@ -107,9 +108,9 @@ class Straightening:
             back = gain < 0.0 if (gain < 0.0).any() else gain <= gain.min()
             if found is best and -gain[gain < 0.0].sum() < self.search.config.arcs.worth:
                 break
-            failed = set(self.label[wrong > 0.0].tolist())
-            stuck = np.array([bool(failed & self.failed & set(arc.sides)) for arc in self.arcs])
-            self.failed |= failed
+            self.failed.update(set(self.label[wrong > 0.0].tolist()))
+            given_up = {key for key, times in self.failed.items() if times >= self.search.config.arcs.failures}
+            stuck = np.array([bool(given_up & set(arc.sides)) for arc in self.arcs])
             self.arcs = [arc for arc, each in zip(self.arcs, back | stuck, strict=True) if not each]
         return best
 

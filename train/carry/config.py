@@ -122,6 +122,8 @@ class ArcConfig:
     """Edges of an arc that is looked at."""
     rounds: int = 6
     """Times that arcs are put back where a piece would be worse, before all of them are."""
+    failures: int = 3
+    """Times that a piece may be invalid before all arcs beside it are put back."""
     worth: float = 1e-4
     """Objective that arcs which cost more than they save lose together, below which they stay."""
     steps: int = 2

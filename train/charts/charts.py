@@ -190,8 +190,10 @@ def brought_back(
     if not late():
         found = straightened(found, config.bands_carried) if coarse is not middle else found
         found.slit_all(config.slit_above, contacts=True)
-        found = with_straight_arcs(found, config.arcs, late)
-        found.polish()
+        found.polish()  # so that what an arc seems to gain is not what more steps would have
+        before, found = found, with_straight_arcs(found, config.arcs, late)
+        if found is not before:
+            found.polish()
         found = spent_fine(found, charts, config, late) if config.stretch else found
     found.mend()
     pieces = list(found.pieces.values())
