@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .runtime import aliases as _aliases  # noqa: F401  # `import flexpara.xatlas` is found through it
 from .runtime import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.errors import FlexparaError
-from .runtime.saving import Saving
+from .runtime.saving import Unwrapping
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -104,7 +104,7 @@ def unwrap(
 def unwrap_pages(
     mesh: MeshLike, options: Options | None = None, *, progress: Progress | None = None, **keywords: Any
 ) -> UnwrapPages:
-    """Unwrap a mesh onto several atlases: one for each mesh or material (options.atlas), or options.pages of them.
+    """Unwrap a mesh onto several atlases: of meshes or materials (options.atlas), or options.pages, as tiles by udim.
 
     Args and raises: as `unwrap`; MissingDependencyError where flexpara[bake] is absent.
     """
@@ -141,9 +141,10 @@ def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None
         from .bake.files.gltfmade import with_document
     with requires("unwrap"):
         from .export.pages import unwrapped_pages
-    whole = with_document(shaded(asset, options.crease_angle))
-    pages = unwrapped_pages(whole, options, Clock.of(progress))
-    return UnwrapPages(whole, tuple(UnwrapResult(*page) for page in pages))
+    whole = shaded(asset, options.crease_angle)
+    whole = whole if options.udim else with_document(whole)
+    results, page = unwrapped_pages(whole, options, Clock.of(progress))
+    return UnwrapPages(whole, tuple(UnwrapResult(*one) for one in results), page if options.udim else None)
 
 
 def unwrap_cloud(
@@ -164,7 +165,7 @@ def unwrap_cloud(
 
 
 @dataclass(frozen=True, eq=False)
-class UnwrapResult(Saving):
+class UnwrapResult(Unwrapping):
     """An unwrapped mesh or point cloud.
 
     asset: the mesh as read and cleaned, with normals, or the triangles laid over the points.  found: what came of it.
@@ -250,7 +251,7 @@ class UnwrapResult(Saving):
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.results.output import BakeJob, result_notes, write_outputs, write_reports
+        from .bake.results.output import BakeJob, result_notes, stack_notes, write_outputs, write_reports
         from .export.assemble import write_networks
         from .runtime.io.asset.changes import lost, told
         from .runtime.io.points.written import point_files, write_points
@@ -271,21 +272,23 @@ class UnwrapResult(Saving):
         if cut := report.pop("polygons_cut"):
             report["changes"]["polygons_cut"] = cut
         if note is not None:
-            for fact in (*told({"polygons_cut": cut}), *result_notes(report)):
+            for fact in (*told({"polygons_cut": cut}), *stack_notes(report["pack"]), *result_notes(report)):
                 note(f"{self.asset.stem}: {fact}")
         write_reports(output, job, {**report, "seconds": {**report["seconds"], **clock.rounded}})
         return output.commit()
 
 
 @dataclass(frozen=True, eq=False)
-class UnwrapPages(Saving):
+class UnwrapPages(Unwrapping):
     """A mesh unwrapped onto several atlases.
 
     asset: all of it, with its scene.  pages: one result for each atlas; the stem of its asset tells which.
+    tile: (f,) of UDIM tiles, the page of each face of the asset, page a + 10 b for uv at (a, b); else None.
     """
 
     asset: Asset
     pages: tuple[UnwrapResult, ...]
+    tile: NDArray[np.int64] | None = field(default=None, repr=False)
 
     @property
     def reports(self) -> list[dict[str, Any]]:
@@ -305,21 +308,17 @@ class UnwrapPages(Saving):
         note: Callable[[str], None] | None = None,
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder."""
-        from .bake.results.pages import check_pages, page_jobs, page_notes, write_pages
+        from .bake.results.several import Several
         from .export.assemble import write_networks
         from .runtime.progress import Clock
 
-        check_pages(output, outputs, [page.asset for page in self.pages])
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
-        pairs = [(page.asset, page.found.atlas) for page in self.pages]
-        jobs = page_jobs(outputs, pairs, self.reports[0]["settings"]["seed"])
+        pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
+        jobs = (several := Several(self.asset, self.tile, pairs, outputs, seed)).jobs(output)
         for page in self.pages:
             networks = write_networks(output, page.asset, page.found, clock, inverse=outputs.inverse)
             report["pages"][page.asset.stem] = {**page.report, **networks}
         apart = all(entry["metrics"]["overlap_fraction"] == 0.0 for entry in self.reports)
-        report |= write_pages(output, jobs, clock, apart=apart)
-        if note is not None:
-            for fact in page_notes(report):
-                note(fact)
-        output.write_report({**report, "seconds": clock.rounded})
+        facts = several.write(output, jobs, clock, note or (lambda _: None), apart=apart)
+        output.write_report({**report, **facts, "seconds": clock.rounded})
         return output.commit()

@@ -32,7 +32,8 @@ from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
 from .runtime.heap import keep_freed_memory
 from .runtime.inputs import STREAM, from_stdin, meshes_of
-from .runtime.options.unwrap import SHARINGS, AtlasOptions, CheckpointOptions, Options, Output, Outputs
+from .runtime.options.atlas import AtlasOptions
+from .runtime.options.unwrap import SHARINGS, CheckpointOptions, Options, Output, Outputs
 from .runtime.options.words import Names
 from .runtime.progress import Clock
 from .runtime.runfile import Run
@@ -183,14 +184,16 @@ def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outpu
 
 def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
     """The padding asked for, by number or by target."""
-    return padding_of(options.padding, outputs.target, options.size, light=outputs.uv_set is not None)
+    return padding_of(options.padding, outputs.target, options.page.side, light=outputs.uv_set is not None)
 
 
 def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
     """Refuse before the work what writing would refuse after it.  Raises: as `check_outputs`, `check_pages`."""
     outputs = run.outputs.for_asset(source)
     check_outputs(folder, outputs, chosen_maps(outputs))
-    if run.options.pages > 1:
+    if run.options.udim:
+        run.outputs.for_tiles()
+    elif run.options.pages > 1:
         run.outputs.for_pages()
     if run.options.atlas != SHARINGS[0]:
         from .runtime.io.asset.pages import pages_of

@@ -7,22 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..runtime.errors import InputError
 from ..runtime.options.keywords import from_keywords
+from ..runtime.pagesize import PageSize
 from .denoise import check_denoiser, denoised
 from .maps.catalogue import find_map
 from .maps.surface import SurfaceFunction, function_map, surface_alone
 from .raster.gutter import check_padding, fill_gutters
 from .raster.layout import check_size
 from .raster.plan import Plan, open_rasterizer
-from .seams.closing import ClosingConfig, closed_seams
-from .seams.seamcheck import agrees_across_seams, find_seams, sample_seams, seam_error
+from .seams.across import Drawn, close_seams
 from .settings import BakeSettings
-from .texture import Texture
+from .texture import as_texture
 from .windows import Ground, background_of, blank_gbuffer, computed, map_windows, put_together
 
 if TYPE_CHECKING:
@@ -31,7 +31,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
+    from ..runtime.pagesize import Size
     from .bakemap import BakeMap, NormalFormat
+    from .texture import Texture
+
+
+class Part(NamedTuple):
+    """What one image of several shows, and the tile (a, b) that it is among them."""
+
+    ground: Ground
+    maps: Sequence[BakeMap]
+    settings: BakeSettings
+    tile: tuple[int, int]
 
 
 def bake(
@@ -57,7 +68,7 @@ def bake(
         warn: called with one line when OpenGL cannot be had and numpy draws instead.
         **keywords: fields of `BakeSettings`, in place of those of settings: size=1024, padding=8, …
 
-    Returns: name → Texture, linear float32 pixels (size, size, c).
+    Returns: name → Texture, linear float32 pixels (h, w, c).
 
     Raises:
         InputError: an unknown map or keyword, a size or uv that cannot be drawn, a map that lacks its source.
@@ -70,45 +81,81 @@ def bake(
             )
         atlas, asset, maps = replace(atlas, source_vertex=np.arange(len(atlas.positions))), surface_alone(atlas), asset
     settings = from_keywords(BakeSettings, settings, keywords)
-    texels = atlas.size if settings.size is None else settings.size
     chosen = find_maps(maps or (), normal_format=settings.normal_format)
     if not chosen:
         return {}
-    check_size(texels)
+    drawn = draw(Ground(atlas, asset), chosen, settings, progress or (lambda _: None), warn)
+    if settings.padding != 0 and settings.tile is None:
+        close_seams(atlas, drawn_maps(chosen), [drawn])
+    return as_textures(chosen, drawn)
+
+
+def bake_together(
+    atlas: Atlas, parts: Sequence[Part], progress: Callable[[str], None] = lambda _: None
+) -> list[dict[str, Texture]]:
+    """As `bake` for parts of one surface, each in a tile of its own; seams between them are closed too.
+
+    atlas: all of them, its uv in their tiles.
+    """
+    drawn = [draw(part.ground, part.maps, part.settings, progress)._replace(tile=part.tile) for part in parts]
+    if all(part.settings.padding != 0 for part in parts):
+        common = [entry for entry in drawn_maps(parts[0].maps) if all(entry.name in one.images for one in drawn)]
+        close_seams(atlas, common, drawn)
+    return [as_textures(part.maps, one) for part, one in zip(parts, drawn, strict=True)]
+
+
+def draw(
+    ground: Ground,
+    chosen: Sequence[BakeMap],
+    settings: BakeSettings,
+    progress: Callable[[str], None],
+    warn: Callable[[str], None] | None = None,
+) -> Drawn:
+    """All maps of one tile, gutters filled, seams not closed yet.  Raises: as `bake`."""
+    page = PageSize.of(ground.atlas.size if settings.size is None else settings.size)
+    check_size(page)
     check_padding(settings.padding)
     if settings.denoise:
         check_denoiser()
-    tell = progress or (lambda _: None)
-    drawn = [entry for entry in chosen if not entry.everywhere]
-    pixels = draw_maps(Ground(atlas, asset), drawn, texels, settings, tell, warn) if drawn else {}
+    images, inside = dict[str, "NDArray[np.float32]"](), np.zeros(page.shape, np.bool_)
+    if shown := drawn_maps(chosen):
+        images, inside = draw_maps(ground, shown, page, settings, progress, warn)
     for entry in (entry for entry in chosen if entry.everywhere):
-        tell(entry.name)
-        pixels[entry.name] = computed(entry, blank_gbuffer(texels), Ground(atlas, asset))
-    return {entry.name: as_texture(entry, pixels[entry.name]) for entry in chosen}
+        progress(entry.name)
+        images[entry.name] = computed(entry, blank_gbuffer(page), ground)
+    return Drawn(images, inside, settings.tile or (0, 0))
+
+
+def drawn_maps(maps: Sequence[BakeMap]) -> list[BakeMap]:
+    """Those that show the surface."""
+    return [entry for entry in maps if not entry.everywhere]
+
+
+def as_textures(maps: Sequence[BakeMap], drawn: Drawn) -> dict[str, Texture]:
+    """Name → Texture."""
+    return {entry.name: as_texture(entry, drawn.images[entry.name]) for entry in maps}
 
 
 def draw_maps(
     ground: Ground,
     maps: Sequence[BakeMap],
-    size: int,
+    page: PageSize,
     settings: BakeSettings,
     progress: Callable[[str], None],
     warn: Callable[[str], None] | None,
-) -> dict[str, NDArray[np.float32]]:
-    """Name → image (size, size, c) of maps that show the surface: drawn, gutters filled, seams closed."""
-    plan = Plan(size, settings.samples, settings.limit, settings.tile)
+) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
+    """Name → image (h, w, c) of maps that show the surface, gutters filled; and the texels (h, w) inside of it."""
+    plan = Plan(page, settings.samples, settings.limit, settings.tile)
     with open_rasterizer(ground.atlas, plan, device=settings.device, warn=warn) as (rasterizer, pieces):
         baked = map_windows(rasterizer, pieces, plan, maps, ground, progress)
-        pixels, covered, inside = put_together(baked, size, settings.scratch)
+        pixels, covered, inside = put_together(baked, page, settings.scratch)
     images = [(pixels[entry.name], background_of(entry, pixels[entry.name])) for entry in maps]
     fill_gutters(images, covered, settings.padding)
     if settings.denoise and any(entry.estimated for entry in maps):
         for entry in (entry for entry in maps if entry.estimated):
             pixels[entry.name][covered] = denoised(entry, pixels[entry.name], covered)[covered]
         fill_gutters(images, covered, settings.padding)
-    if settings.padding != 0 and settings.tile is None:
-        close_seams(ground.atlas, maps, pixels, inside)
-    return pixels
+    return pixels, inside
 
 
 def find_maps(
@@ -120,32 +167,7 @@ def find_maps(
     return [find_map(entry, normal_format=normal_format) if isinstance(entry, str) else entry for entry in maps]
 
 
-def chart_labels(atlas: Atlas, size: int, padding: int | None) -> NDArray[np.int32]:
-    """(size, size) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.clean_mip` takes."""
+def chart_labels(atlas: Atlas, size: Size, padding: int | None) -> NDArray[np.int32]:
+    """(h, w) int32 chart of each texel, gutters included, −1 beyond: what `seamcheck.clean_mip` takes."""
     labels = bake(atlas, {"chart": lambda _, __, face: atlas.face_chart[face] + 1}, size=size, padding=padding)
     return labels["chart"].pixels[..., 0].astype(np.int32) - 1
-
-
-def close_seams(
-    atlas: Atlas, entries: Sequence[BakeMap], pixels: Mapping[str, NDArray[np.float32]], inside: NDArray[np.bool_]
-) -> None:
-    """Where the two sides of seams differ visibly, move texels at the borders of charts, in place: see closing.py."""
-    entries = [entry for entry in entries if agrees_across_seams(entry.name, entry.space)]
-    seams = find_seams(atlas) if entries else np.zeros((0, 2, 2, 2))
-    if len(seams) == 0:
-        return
-    samples, config = sample_seams(seams, len(inside)), ClosingConfig()
-    for entry in entries:
-        image, shown = pixels[entry.name], entry.value_range == "[0, 1]"
-        error = seam_error(as_texture(entry, image), samples)
-        if error is not None and error.maximum > config.visible:
-            found = closed_seams(image, samples, inside, config, estimated=entry.estimated, measured=not shown)
-            row, column = np.divmod(found[0], len(inside))
-            low, high = {"[0, 1]": (0.0, 1.0), "[-1, 1]": (-1.0, 1.0)}.get(entry.value_range, (-np.inf, np.inf))
-            image[row, column] = np.clip(found[1], low, high)
-
-
-def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:
-    """Pixels with what the map says of them."""
-    metadata = {"map": entry.name, "space": entry.space, "units": entry.units, "range": entry.value_range}
-    return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)

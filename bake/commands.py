@@ -12,18 +12,8 @@ from .. import __version__
 from ..runtime.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
-from ..runtime.options.unwrap import (
-    AUTO,
-    LAST_SET,
-    AtlasOptions,
-    Flag,
-    MapOptions,
-    Names,
-    Output,
-    Outputs,
-    Seeded,
-    demand,
-)
+from ..runtime.options.atlas import AtlasOptions, Seeded
+from ..runtime.options.unwrap import AUTO, LAST_SET, Flag, MapOptions, Names, Output, Outputs, demand
 from ..runtime.options.words import Paths
 from ..runtime.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
@@ -102,7 +92,7 @@ def bake(
         source: See HighOptions.
         console: See Console.
     """
-    options = replace(options, padding=padding_of(options.padding, options.target, options.size))
+    options = replace(options, padding=padding_of(options.padding, options.target, options.page.side))
     high = _high_source(source, options.crease_angle)
     chosen_maps(options.outputs, high=high)
     from ..runtime.files import OutputFolder
@@ -139,7 +129,7 @@ def _layout(asset: Asset, options: BakeOptions, console: Console) -> Atlas:
     from .square import into_square
 
     laid_out = asset if options.uv_set is None else replace(asset, uv=uv_of_set(asset, options.uv_set))
-    atlas = replace(atlas_from_uv(laid_out), size=options.size, padding=options.margin)
+    atlas = replace(atlas_from_uv(laid_out), size=options.page.stored, padding=options.margin)
     console.demand_none(asset.stem, layout_faults(atlas.corner_uv, tiles=options.udim))
     if options.udim:
         return atlas
@@ -159,7 +149,7 @@ def _job(atlas: Atlas, asset: Asset, options: BakeOptions, high: HighSource | No
 def _bake_one(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any]:
     """Bake and write one image for each map; what the report says of them."""
     textures = texture_facts(job.atlas, bake_textures(folder, job, clock))
-    textures["clean_mip"] = bleeding(job.atlas, job.atlas.size, gutter_of(job.atlas, job.outputs))
+    textures["clean_mip"] = bleeding(job.atlas, gutter_of(job.atlas, job.outputs))
     return {"textures": textures}
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from ..runtime.pagesize import Size
     from .bakemap import NormalFormat
     from .raster.plan import Device
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 class BakeSettings:
     """Size and quality of images, and what draws them.  Checked when they are used: see `baker.bake`.
 
-    size: texels per side; None is the atlas' own.
+    size: texels of a square's side, or WIDTHxHEIGHT; None is the atlas' own.
     padding: texels of gutter around charts, beyond which lies the background; None fills the whole image.
     samples: 1, 4 or 16 per texel.
     normal_format: green channel of maps in tangent space that are asked for by name, opengl (+Y) or directx (−Y).
@@ -27,7 +28,7 @@ class BakeSettings:
     scratch: a folder on whose disk images are kept, in files without a name, instead of in memory: for 16k.
     """
 
-    size: int | None = None
+    size: Size | None = None
     padding: int | None = None
     samples: int = 1
     normal_format: NormalFormat = "opengl"

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from .bakemap import BakeMap
+
 Encoding = Literal["srgb", "unit", "signed", "linear"]
 Bits = Literal[8, 16, 32]
 FileType = Literal["png", "exr"]
@@ -39,3 +41,9 @@ class Texture:
     file_type: FileType
     dither: bool = False
     metadata: dict[str, str] = field(default_factory=dict)
+
+
+def as_texture(entry: BakeMap, pixels: NDArray[np.float32]) -> Texture:
+    """Pixels with what the map says of them."""
+    metadata = {"map": entry.name, "space": entry.space, "units": entry.units, "range": entry.value_range}
+    return Texture(pixels, entry.encoding, entry.bits, entry.file_type, entry.dither, metadata)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..runtime.mesh import Asset, Atlas
+    from ..runtime.pagesize import PageSize
     from .bakemap import BakeMap
     from .raster.layout import Window
     from .raster.plan import Plan, Rasterizer
@@ -81,21 +82,21 @@ def map_windows(
 
 
 def put_together(
-    windows: Iterable[BakedWindow], size: int, scratch: Path | None
+    windows: Iterable[BakedWindow], page: PageSize, scratch: Path | None
 ) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Windows → name → image (size, size, c), and which texels hold a surface and lie inside of it, (size, size) bool.
+    """Windows → name → image (h, w, c), and which texels hold a surface and lie inside of it, (h, w) bool.
 
     One window is put into the images while the next is made.
     """
     images: dict[str, NDArray[np.float32]] = {}
-    covered, inside = np.zeros((2, size, size), np.bool_)
+    covered, inside = np.zeros((2, *page.shape), np.bool_)
     with ThreadPoolExecutor(1) as filler:
         filled: Future[None] | None = None
         for baked in windows:
             if filled is not None:
                 filled.result()
             for name, part in baked.maps.items():
-                images[name] = with_channels(images.get(name), part.shape[2], size, scratch)
+                images[name] = with_channels(images.get(name), part.shape[2], page, scratch)
             covered[baked.window.rows, baked.window.columns] = baked.covered
             inside[baked.window.rows, baked.window.columns] = baked.inside
             filled = filler.submit(put_window, baked, dict(images))
@@ -112,12 +113,12 @@ def computed(entry: BakeMap, gbuffer: GBuffer, ground: Ground) -> NDArray[np.flo
     return np.asarray(pixels, np.float32)
 
 
-def blank_gbuffer(size: int) -> GBuffer:
-    """A G-buffer of size × size texels without a surface and without memory, for maps that need none."""
-    nothing = np.broadcast_to(np.float32(0.0), (size, size))
-    vector = np.broadcast_to(np.float32(0.0), (size, size, 3))
-    face = np.broadcast_to(np.int32(-1), (size, size))
-    return GBuffer(vector, vector, nothing, nothing, face, size=size)
+def blank_gbuffer(page: PageSize) -> GBuffer:
+    """A G-buffer of a whole image without a surface and without memory, for maps that need none."""
+    nothing = np.broadcast_to(np.float32(0.0), page.shape)
+    vector = np.broadcast_to(np.float32(0.0), (*page.shape, 3))
+    face = np.broadcast_to(np.int32(-1), page.shape)
+    return GBuffer(vector, vector, nothing, nothing, face, size=page)
 
 
 def _reduced(pixels: NDArray[np.float32], held: NDArray[np.bool_], along: int, entry: BakeMap) -> NDArray[np.float32]:
@@ -143,15 +144,15 @@ def background_of(entry: BakeMap, image: NDArray[np.float32]) -> NDArray[np.floa
 
 
 def with_channels(
-    image: NDArray[np.float32] | None, channels: int, size: int, scratch: Path | None = None
+    image: NDArray[np.float32] | None, channels: int, page: PageSize, scratch: Path | None = None
 ) -> NDArray[np.float32]:
-    """An image (size, size, c) of at least so many channels: new, as it is, or with alpha 1 added.
+    """An image (h, w, c) of at least so many channels: new, as it is, or with alpha 1 added.
 
     The number of channels may differ from window to window: a map leaves out alpha where it is 1.
     """
     if image is not None and image.shape[2] >= channels:
         return image
-    wider = new_image((size, size, channels), scratch)
+    wider = new_image((*page.shape, channels), scratch)
     if image is not None:
         wider[..., : image.shape[2]] = image
         wider[..., image.shape[2] :] = 1.0

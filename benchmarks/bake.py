@@ -81,7 +81,7 @@ def batches(gbuffer: GBuffer, atlas: Atlas, asset: Asset, count: int) -> Iterato
     for start in range(0, len(texels), SPARSE * step):
         chosen = texels[start : start + step]
         origin, normal = starting_points(gbuffer, atlas, asset, frame, chosen)
-        direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(chosen), gbuffer.side), normal)
+        direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(chosen), gbuffer.page.width), normal)
         yield np.repeat(origin, count, axis=0), direction.reshape(-1, 3)
 
 
@@ -169,7 +169,7 @@ def by_blender(
 def band_of(gbuffer: GBuffer, first: int, last: int) -> GBuffer:
     """Rows first to last of a G-buffer."""
     parts = {name: getattr(gbuffer, name)[first:last] for name in ("position", "normal", "second", "third", "face")}
-    return replace(gbuffer, **parts, row=gbuffer.row + first, size=gbuffer.side)
+    return replace(gbuffer, **parts, row=gbuffer.row + first, size=gbuffer.page)
 
 
 def high_rows(atlas: Atlas, low: Asset, high: Asset, size: int, cage: float, blender: str | None) -> Iterator[Row]:

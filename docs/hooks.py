@@ -14,6 +14,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = (
     "runtime/options/unwrap.py",
+    "runtime/options/atlas.py",
     "runtime/options/seams.py",
     "runtime/options/pack.py",
     "runtime/options/batch.py",

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ..runtime.files import OutputFolder
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.pack.square import Square
+    from ..runtime.pagesize import Size
     from ..runtime.progress import Clock
     from ..train.deploy.gated import GatedExperts
     from ..train.pipeline import Trained
@@ -68,9 +69,9 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
     """
     with clock.stage("pack"):
         trained, packed = _valid_atlas(asset, trained, square)
-    atlas, size = packed.atlas, square.size
+    atlas = packed.atlas
     with clock.stage("measure"):
-        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size, stack=atlas.face_stack)
+        metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=atlas.size, stack=atlas.face_stack)
     with clock.stage("fit"):  # what is left of it
         networks = trained.networks
     report: dict[str, Any] = {
@@ -90,7 +91,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
         parity = export_networks(networks, placed, path, metadata=facts)
         network = agreement(UnwrapSession(path), atlas, seed=trained.settings["seed"])
         onnx = path.read_bytes()
-        paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, size, facts)
+        paper = None if trained.paper is None else _paper_file(trained.paper, asset, trained.frame, atlas.size, facts)
     report |= {"parity": asdict(parity), "network": network.to_dict()}
     report["seconds"] = clock.rounded
     return Unwrapped(trained.charts, trained.frame, atlas, networks, onnx, report, paper)
@@ -179,7 +180,7 @@ def write_networks(
     return facts
 
 
-def _paper_file(model: nn.Module, asset: Asset, frame: Frame, size: int, facts: Provenance) -> bytes:
+def _paper_file(model: nn.Module, asset: Asset, frame: Frame, size: Size, facts: Provenance) -> bytes:
     """The networks of preset paper as they were trained; torch is loaded for them alone."""
     from .paper.raw import raw_onnx
 

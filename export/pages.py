@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from ..train.workers import Beside
 from .assemble import Unwrapped, assemble
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..runtime.mesh import Asset
     from ..runtime.options.unwrap import Options
     from ..runtime.pack.square import Square
@@ -30,30 +32,38 @@ if TYPE_CHECKING:
     from ..train.pipeline import Trained
 
 
-def unwrapped_pages(asset: Asset, options: Options, clock: Clock) -> list[tuple[Asset, Unwrapped]]:
+class Pages(NamedTuple):
+    """Each page as a mesh of its own with what came of it, and the page (f,) of each face of the whole.
+
+    page: None where pages are meshes or materials.
+    """
+
+    results: list[tuple[Asset, Unwrapped]]
+    page: NDArray[np.int64] | None = None
+
+
+def unwrapped_pages(asset: Asset, options: Options, clock: Clock) -> Pages:
     """The pages that options ask for: meshes, materials or so many, each with what came of it.
 
-    asset: with a document, shaded.  Raises: as `train_asset` and `assemble`.
+    asset: with a document where meshes or materials are asked for, shaded.  Raises: as `train_asset` and `assemble`.
     """
     square = square_of(options)
-    if options.pages > 1:
+    if options.paged:
         return assemble_pages(asset, train_asset(asset, options, clock), clock, square, options.pages)
     parts = pages_of(asset, options.atlas)
-    return [(part, assemble(part, train_asset(part, options, clock), clock, square)) for part in parts]
+    return Pages([(part, assemble(part, train_asset(part, options, clock), clock, square)) for part in parts])
 
 
-def assemble_pages(
-    asset: Asset, trained: Trained, clock: Clock, square: Square, count: int
-) -> list[tuple[Asset, Unwrapped]]:
+def assemble_pages(asset: Asset, trained: Trained, clock: Clock, square: Square, count: int) -> Pages:
     """Each page that got charts: a mesh of its own, STEM_1, STEM_2, …, and what `assemble` makes of it.
 
-    asset: with a document.  Raises: as `assemble`.
+    Raises: as `assemble`.
     """
     trained.fitted.end()  # of all pages in one
     seed, fit = trained.settings["seed"], fit_in_force(trained.settings)
     with clock.stage("pack"):
         paged = pack_pages(asset, trained.charts, square, count, seed)
-    even = square._replace(texel_density=paged.report["chart_scale"] * square.size)
+    even = square._replace(texel_density=paged.report["chart_scale"] * square.page.side)
     found: list[tuple[Asset, Unwrapped]] = []
     for number in np.unique(paged.page).tolist():
         own = paged.page == number
@@ -62,4 +72,4 @@ def assemble_pages(
         ball = Surface(trained.frame.apply(page.surface.vertices), page.surface.faces)
         fitted = Beside(partial(fit_networks, ball, charts, fit, seed))
         found.append((page, assemble(page, replace(trained, charts=charts, fitted=fitted), clock, even)))
-    return found
+    return Pages(found, np.unique(paged.page, return_inverse=True)[1].reshape(-1))

@@ -11,7 +11,9 @@ from cyclopts import Parameter
 
 from .console import show
 from .errors import InputError
-from .options.unwrap import AtlasOptions, Flag, Output
+from .options.atlas import AtlasOptions
+from .options.unwrap import Flag, Output
+from .pagesize import Size
 
 SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
 
@@ -40,7 +42,7 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
 def evaluate(
     mesh: Path,
     *,
-    size: int | None = None,
+    size: Size | None = None,
     faces: Path | None = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
 ) -> int:
@@ -48,7 +50,7 @@ def evaluate(
 
     Args:
         mesh: A mesh with uv.
-        size: Side of the atlas in texels, which texel density and bleeding are measured for.
+        size: Texels of the atlas, as 2048 or 2048x1024, which texel density and bleeding are measured for.
         faces: Also write an npz file with what is true of each triangle: charts, distortion (mean symmetric Dirichlet
             energy, 1 is isometric), and polygons, which of the file's polygons it is of.
         as_json: Print JSON.

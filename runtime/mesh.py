@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .geometry.triangles import triangle_areas, triangle_cross, triangle_normals
+from .pagesize import PageSize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .io.gltf.document import Document
     from .io.obj.text import ObjText
     from .material import Material
+    from .pagesize import Size
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,14 +156,15 @@ class Charts:
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Charts packed into the unit square; vertices are split along seams, so it is what an engine loads.
+    """Charts packed onto a page; vertices are split along seams, so it is what an engine loads.
 
     positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float32 in [0, 1], v up, multiples of 2⁻²⁴ where
     `pack` made them, so that 1 − v is exact.  normals: (n, 3) float32 unit.
     face_chart: (f,) int64.  source_vertex: (n,) int64 into Asset.positions.
-    size: texels per side.  padding: texels kept free around each chart (so two charts are 2 × padding apart).
-    placement: (k, 2, 3) float64, chart coordinates → atlas uv (a similarity, same scale for all charts; rectangles that
-    were asked to fill whole texels lose a part of a texel), or None when the uv came from elsewhere.
+    size: texels of a square's side, or WIDTHxHEIGHT; 0 where unknown.  padding: texels kept free around each chart (so
+    two charts are 2 × padding apart).
+    placement: (k, 2, 3) float64, chart coordinates → atlas uv (on the page a similarity, same scale for all charts;
+    rectangles that were asked to fill whole texels lose a part of a texel), or None when the uv came from elsewhere.
     stack: (k,) int64, the chart that each lies on where congruent charts share their place; None where none does.
     """
 
@@ -171,7 +174,7 @@ class Atlas:
     normals: NDArray[np.float32]
     face_chart: NDArray[np.int64]
     source_vertex: NDArray[np.int64]
-    size: int
+    size: Size
     padding: int
     placement: NDArray[np.float64] | None = None
     stack: NDArray[np.int64] | None = None
@@ -180,6 +183,16 @@ class Atlas:
     def corner_uv(self) -> NDArray[np.float64]:
         """(f, 3, 2) float64: the uv as written (float32 values)."""
         return self.uv[self.faces].astype(np.float64)
+
+    @property
+    def page(self) -> PageSize:
+        """Width and height in texels."""
+        return PageSize.of(self.size)
+
+    @property
+    def even_uv(self) -> NDArray[np.float64]:
+        """(f, 3, 2) float64: the uv in sides of the page, in which shapes are what they are on it."""
+        return self.page.even(self.corner_uv) if self.size else self.corner_uv
 
     @property
     def face_stack(self) -> NDArray[np.int64] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,15 +15,18 @@ if TYPE_CHECKING:
     from .progress import Progress
 
 
-class Saving(ABC):
-    """What an unwrap gives back.   asset: whose stem the files have."""
+Wanted = TypeVar("Wanted", bound="Outputs")
+
+
+class Saving(ABC, Generic[Wanted]):
+    """What an unwrap or packing gives back.   asset: whose stem the files have."""
 
     asset: Asset
 
     def save(
         self,
         folder: str | Path,
-        outputs: Outputs | None = None,
+        outputs: Wanted | None = None,
         *,
         force: bool = False,
         progress: Progress | None = None,
@@ -33,10 +36,10 @@ class Saving(ABC):
 
         Args:
             folder: made where it is absent.
-            outputs: what is written, see `flexpara.Outputs`; None: its defaults.
+            outputs: what is written, see `flexpara.Outputs` and `PackOutputs`; None: its defaults.
             force: whether files are overwritten that flexpara did not write.
             progress: as for `unwrap`.
-            **keywords: fields of `flexpara.Outputs`, in place of those of outputs: maps=("normal",), preview=False, …
+            **keywords: fields of it, in place of those of outputs: maps=("normal",), preview=False, …
 
         Raises:
             InputError: an unknown map, format, target or keyword.
@@ -45,18 +48,31 @@ class Saving(ABC):
         """
         from .files import OutputFolder
         from .options.keywords import from_keywords
-        from .options.unwrap import Outputs
 
-        outputs = from_keywords(Outputs, outputs, keywords)
+        outputs = from_keywords(self.outputs_kind(), outputs, keywords)
         with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
             return self.write(output, outputs, progress)
+
+    @abstractmethod
+    def outputs_kind(self) -> type[Wanted]:
+        """The class of options that say what is written."""
 
     @abstractmethod
     def write(
         self,
         output: OutputFolder,
-        outputs: Outputs,
+        outputs: Wanted,
         progress: Progress | None = None,
         note: Callable[[str], None] | None = None,
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
+
+
+class Unwrapping(Saving["Outputs"]):
+    """What an unwrap gives back."""
+
+    def outputs_kind(self) -> type[Outputs]:
+        """Those of unwrapping."""
+        from .options.unwrap import Outputs
+
+        return Outputs

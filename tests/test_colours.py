@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from flexpara.__main__ import main
 from flexpara.runtime.io.meshfile import load_asset
@@ -127,3 +128,40 @@ def test_splats_reach_the_texture(tmp_path: Path) -> None:
     clear = np.abs(middle[:, 2]) > 0.15
     wanted = np.where(middle[:, 2:] > 0.0, ORANGE, TEAL)
     assert np.abs(at_faces(tmp_path / "out", "splats").astype(int) - wanted)[clear].max() <= 2
+
+
+def sheet(folder: Path, texels: NDArray[np.uint8], mode: str) -> Path:
+    """One quad whose material has a texture of its own, in levels of 8 or 16 bits."""
+    height, width = texels.shape
+    if mode == "I;16":
+        Image.fromarray(texels.astype(np.uint16) * 257).save(folder / "levels.png")
+    else:
+        Image.fromarray(texels).convert(mode).save(folder / "levels.png")
+    (folder / "sheet.mtl").write_text("newmtl paint\nKd 1 1 1\nmap_Kd levels.png\n", encoding="utf-8")
+    corners = "".join(f"v {x * width} {y * height} 0\nvt {x} {y}\n" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    path = folder / "sheet.obj"
+    path.write_text(f"mtllib sheet.mtl\n{corners}usemtl paint\nf 1/1 2/2 3/3 4/4\n", encoding="utf-8")
+    return path
+
+
+def baked_sheet(path: Path, out: Path, size: str) -> NDArray[np.int64]:
+    assert main(["bake", str(path), "-o", str(out), "--maps", "base-color", "--size", size, "--quiet"]) == 0
+    return read_image(out / "sheet_base-color.png")[..., :3].astype(np.int64)
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "I;16"])
+def test_all_levels_of_a_texture_come_through_baking(tmp_path: Path, mode: str) -> None:
+    levels = np.arange(256, dtype=np.uint8).reshape(8, 32).repeat(2, axis=0).repeat(2, axis=1)
+    found = baked_sheet(sheet(tmp_path, levels, mode), tmp_path / "out", "64x16")
+    assert np.abs(found - levels[..., None]).max() <= 1
+    inner = np.full((16, 64), 77, np.uint8)
+    (tmp_path / "flat").mkdir()
+    flat = baked_sheet(sheet(tmp_path / "flat", inner, mode), tmp_path / "flat" / "out", "64x16")
+    assert (flat == 77).all()
+
+
+def test_texels_are_averaged_in_linear_light(tmp_path: Path) -> None:
+    """A checker of black and white texels at half the size is the grey of half the light, 188, not 128."""
+    checker = (np.indices((32, 64)).sum(axis=0) % 2 * 255).astype(np.uint8)
+    found = baked_sheet(sheet(tmp_path, checker, "L"), tmp_path / "out", "32x16")
+    assert np.abs(found - 188).max() <= 1

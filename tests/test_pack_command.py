@@ -103,7 +103,7 @@ def test_congruent_islands_share_their_texels_and_that_is_said(
 ) -> None:
     words = ("--maps", "none", "--stack", "identical", "--rotation", "90", "--whole-texels")
     assert main(["pack", str(house), "-o", str(tmp_path / "out"), "--size", "64", *words]) == 0
-    assert "1 islands lie on others" in capsys.readouterr().err
+    assert "1 charts lie on others" in capsys.readouterr().err
     report = json.loads((tmp_path / "out" / "house.report.json").read_text(encoding="utf-8"))
     assert report["pack"]["stacked"] == 1
     assert report["metrics"]["overlap_fraction"] == 0.0

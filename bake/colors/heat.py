@@ -46,4 +46,4 @@ def heat_colors(value: NDArray[np.float64]) -> NDArray[np.float32]:
 
 def face_areas(atlas: Atlas) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Area of each face on the surface and in uv, (f,) float64 each, not negative."""
-    return triangle_areas(atlas.positions[atlas.faces]), np.abs(signed_areas(atlas.corner_uv))
+    return triangle_areas(atlas.positions[atlas.faces]), np.abs(signed_areas(atlas.even_uv))

@@ -13,7 +13,7 @@ from ...runtime.geometry.triangles import signed_areas, triangle_areas
 from ...runtime.io.asset.shading import shaded
 from ...runtime.material import Material
 from ...runtime.mesh import Asset, Atlas, Surface
-from ...runtime.options.unwrap import SourceOptions
+from ...runtime.options.atlas import SourceOptions
 from ...runtime.pack.exact.seamvertices import atlas_normals
 
 if TYPE_CHECKING:

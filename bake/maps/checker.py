@@ -1,7 +1,7 @@
 """The uv test card: shows stretch, scale, orientation and mirroring wherever it lands on a surface.
 
-16 × 16 labelled cells over [0, 1]²: letter = row from the bottom (v), number = column from the left (u), so that "A1"
-is at the uv origin.
+16 × 16 labelled cells over [0, 1]², fewer along the shorter side of a page: letter = row from the bottom (v), number =
+column from the left (u), so that "A1" is at the uv origin.
 Hue runs with u, lightness with v; cells alternate light and dark, each holds 4 × 4 finer squares and an arrow along v.
 No symmetry maps the card onto itself.
 """
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.pagesize import PageSize
 from ..colors.color import linear_from_oklab
 from ..colors.lettering import text_cover
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from ...runtime.pagesize import Size
     from ..raster.gbuffer import GBuffer
 
 CELLS = 16
@@ -29,17 +31,20 @@ LABEL, LABEL_ROW, ARROW_ROW = 22.0, 16, 45
 FINE = 4
 
 
-def uv_card(size: int) -> NDArray[np.float32]:
-    """(size, size, 3) float32 linear light: the card sampled at texel centres, row 0 = top (v = 1)."""
-    place = (np.arange(size) + 0.5) / size
-    column, row = np.floor(place * CELLS).astype(int), np.floor((1.0 - place) * CELLS).astype(int)
-    fine_column, fine_row = (
-        np.floor(place * CELLS * FINE).astype(int),
-        np.floor((1.0 - place) * CELLS * FINE).astype(int),
+def uv_card(size: Size | PageSize) -> NDArray[np.float32]:
+    """(h, w, 3) float32 linear light: the card sampled at texel centres, row 0 = top (v = 1)."""
+    page = PageSize.of(size)
+    # in cells: to the right, and upwards from the bottom
+    across, up = (
+        (np.arange(texels) + 0.5) / texels * max(round(CELLS * share), 1)
+        for texels, share in zip(page, page.extent.tolist(), strict=True)
     )
+    up = up[::-1]
+    column, row = np.floor(across).astype(int), np.floor(up).astype(int)
+    fine_column, fine_row = np.floor(across * FINE).astype(int), np.floor(up * FINE).astype(int)
     tone = (column[None, :] + row[:, None]) % 2 * 2 + (fine_column[None, :] + fine_row[:, None]) % 2
-    dot_column = np.minimum((place * CELLS * DOTS).astype(int), CELLS * DOTS - 1)
-    ink = _ink()[dot_column[:, None], dot_column[None, :]]
+    dot_column, dot_row = np.floor(across * DOTS).astype(int), CELLS * DOTS - np.ceil(up * DOTS).astype(int)
+    ink = _ink()[dot_row[:, None], dot_column[None, :]]
     tone[ink] = 4
     return _palette()[tone, row[:, None], column[None, :]]
 
@@ -50,7 +55,7 @@ def uv_checker_map(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.f
     Space uv, linear light in [0, 1]; srgb, PNG 8 bits by default (3 channels).
     """
     del atlas, asset
-    return uv_card(gbuffer.shape[0])
+    return uv_card(gbuffer.page)
 
 
 def _palette() -> NDArray[np.float32]:

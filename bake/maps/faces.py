@@ -60,7 +60,7 @@ def distortion_map() -> Compute:
 
     @lru_cache(maxsize=1)
     def face_colors(atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
-        stretch = face_distortion(asset.surface, atlas.corner_uv)
+        stretch = face_distortion(asset.surface, atlas.even_uv)
         return heat_colors(signed_distortion(atlas, stretch, distortion_scale(stretch)))
 
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset) -> NDArray[np.float32]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ...runtime.material import Slot
     from ...runtime.mesh import Asset, Atlas
+    from ...runtime.pagesize import PageSize
     from ..bakemap import Compute
     from ..raster.gbuffer import GBuffer
     from .resample import Decoding
@@ -50,15 +51,15 @@ Shade = Callable[[Material, "NDArray[np.float32] | None", "NDArray[np.int64]"], 
 class SourceSlot:
     """One slot of all materials of an asset, made ready once: decoded textures, old uv and footprints per face."""
 
-    def __init__(self, atlas: Atlas, asset: Asset, slot: Slot, size: int) -> None:
-        """Prepare.  size: texels per side of the image that is baked."""
+    def __init__(self, atlas: Atlas, asset: Asset, slot: Slot, page: PageSize) -> None:
+        """Prepare.  page: size of the image that is baked."""
         self.materials = asset.materials or (BARE,)
         none = np.zeros(len(atlas.faces), np.int64)
         self.face_material = asset.face_material if asset.face_material is not None else none
         pictures = [None if asset.uv is None else entry.pictures.get(slot) for entry in self.materials]
         old = np.zeros((len(atlas.faces), 3, 2)) if asset.uv is None else asset.uv[atlas.source_vertex[atlas.faces]]
         self.old_uv = old
-        axes = texel_axes(atlas.corner_uv, old, size)
+        axes = texel_axes(atlas.corner_uv, old, page)
         self.samplers = [
             None if picture is None else FootprintSampler(SourceTexture(picture, DECODING[slot], CHANNELS[slot]), axes)
             for picture in pictures
@@ -95,7 +96,7 @@ class SourceSlot:
         return sampler.sample(corner[:, 0] + weight[:, 1:2] * across + weight[:, 2:] * along, face)
 
 
-def prepared() -> Callable[[Atlas, Asset, Slot, int], SourceSlot]:
+def prepared() -> Callable[[Atlas, Asset, Slot, PageSize], SourceSlot]:
     """SourceSlot, remembered for the last one asked for: an image baked in windows prepares its textures once."""
     return lru_cache(maxsize=1)(SourceSlot)
 
@@ -122,7 +123,7 @@ def base_color_map() -> Compute:
             result = result * np.asarray(material.base_color_factor, np.float32)
             return with_alpha_mode(result, material, hard=blended)
 
-        return ready(atlas, asset, "base-color", gbuffer.side).shaded(gbuffer, 4, shade)
+        return ready(atlas, asset, "base-color", gbuffer.page).shaded(gbuffer, 4, shade)
 
     return compute
 
@@ -157,7 +158,7 @@ def metallic_roughness_map() -> Compute:
             result[:, 2] = metallic * (1.0 if values is None else values[:, 2])
             return result
 
-        return ready(atlas, asset, "metallic-roughness", gbuffer.side).shaded(gbuffer, 3, shade)
+        return ready(atlas, asset, "metallic-roughness", gbuffer.page).shaded(gbuffer, 3, shade)
 
     return compute
 
@@ -177,7 +178,7 @@ def occlusion_map() -> Compute:
                 return np.ones((len(texels), 1), np.float32)
             return 1.0 + np.float32(material.occlusion_strength) * (values[:, :1] - 1.0)
 
-        return ready(atlas, asset, "occlusion", gbuffer.side).shaded(gbuffer, 1, shade)
+        return ready(atlas, asset, "occlusion", gbuffer.page).shaded(gbuffer, 1, shade)
 
     return compute
 
@@ -214,7 +215,7 @@ def emissive_map() -> Compute:
             texture = np.ones((len(texels), 3), np.float32) if values is None else values[:, :3]
             return texture * factor * np.float32(scale)
 
-        return ready(atlas, asset, "emissive", gbuffer.side).shaded(gbuffer, 3, shade)
+        return ready(atlas, asset, "emissive", gbuffer.page).shaded(gbuffer, 3, shade)
 
     return compute
 
@@ -239,7 +240,7 @@ def textured_normals() -> Callable[[GBuffer, Atlas, Asset, NDArray[np.int64]], N
     frames = lru_cache(maxsize=1)(old_frames)
 
     def compute(gbuffer: GBuffer, atlas: Atlas, asset: Asset, texels: NDArray[np.int64]) -> NDArray[np.float32]:
-        slot = ready(atlas, asset, "normal", gbuffer.side)
+        slot = ready(atlas, asset, "normal", gbuffer.page)
         frame = gbuffer.interpolate(frames(atlas, asset), np.arange(3 * len(atlas.faces)).reshape(-1, 3), texels)
         material_of = slot.face_material[gbuffer.face.reshape(-1)[texels]]
         local = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(texels), 1))

@@ -201,7 +201,7 @@ def _gather(
     def batch(texels: NDArray[np.int64]) -> None:
         origin, normal = starting_points(gbuffer, atlas, asset, scene.frame, texels, inwards=inwards)
         axis = -normal if inwards else normal
-        direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(texels), gbuffer.side), axis)
+        direction = cosine_directions(patterns, pattern_of(gbuffer.image_texels(texels), gbuffer.page.width), axis)
         result[texels] = estimate.kernel(scene, origin, direction, normal)
 
     in_batches(batch, gbuffer.texels, max(BATCH // settings.count, 1), settings.progress)

@@ -19,12 +19,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...runtime.geometry.triangles import cross_2d
+from ...runtime.pagesize import PageSize
 from ..colors.color import byte_to_linear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.material import Picture, Wrap
+    from ...runtime.pagesize import Size
 
 ROUNDING = 0.01
 """Powers of 2 by which a footprint may exceed a grid: uv in float32 make texels that are copied one by one uneven."""
@@ -188,13 +190,14 @@ class FootprintSampler:
         return total
 
 
-def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+def texel_axes(new_uv: NDArray[np.float64], old_uv: NDArray[np.float64], size: Size | PageSize) -> NDArray[np.float64]:
     """(f, 2, 2) float64: change of the old uv by one texel to the right (row 0) and one down (row 1), per face.
 
-    new_uv, old_uv: (f, 3, 2) float64, v up.  size: texels per side of the new atlas.  Zero for a face that has no area
+    new_uv, old_uv: (f, 3, 2) float64, v up.  size: of the new atlas.  Zero for a face that has no area
     in the new uv.
     """
-    new = (new_uv[:, 1:] - new_uv[:, :1]) * np.array([size, -size], np.float64)
+    page = PageSize.of(size)
+    new = (new_uv[:, 1:] - new_uv[:, :1]) * np.array([page.width, -page.height], np.float64)
     old = old_uv[:, 1:] - old_uv[:, :1]
     area = cross_2d(new[:, 0], new[:, 1])
     inverse = np.stack([new[:, 1, 1], -new[:, 0, 1], -new[:, 1, 0], new[:, 0, 0]], axis=1).reshape(-1, 2, 2)

@@ -59,7 +59,7 @@ def render_preview(atlas: Atlas, asset: Asset, path: Path) -> None:
 
 def preview_pixels(atlas: Atlas, asset: Asset) -> NDArray[np.float32]:
     """(696, 1920, 3) float32 linear light.  Arguments and errors as `render_preview`."""
-    stretch = face_distortion(asset.surface, atlas.corner_uv)
+    stretch = face_distortion(asset.surface, atlas.even_uv)
     top, charts = distortion_scale(stretch), int(atlas.face_chart.max()) + 1
     normals, seams = shading_normals(asset), seam_edges(atlas)
     checkered = solid(atlas, normals, chart_colors(charts)[atlas.face_chart], cells=checker_cells(atlas))
@@ -89,22 +89,23 @@ def shading_normals(asset: Asset) -> NDArray[np.float64]:
 
 def solid(atlas: Atlas, normals: NDArray[np.float64], colors: NDArray[np.float32], *, cells: float = 0.0) -> Shape:
     """The surface in 3D with normals (f, 3, 3) and a colour per face (f, 3)."""
-    return Shape(atlas.positions[atlas.faces], normals, atlas.corner_uv, colors, cells=cells)
+    return Shape(atlas.positions[atlas.faces], normals, atlas.even_uv, colors, cells=cells)
 
 
 def layout(atlas: Atlas, colors: NDArray[np.float32]) -> tuple[Camera, Shape, Lines]:
-    """The uv square seen from above: white sheet, charts in their colours (k, 3), their outlines."""
-    sheet = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)
-    flat = np.concatenate([sheet, atlas.corner_uv])
+    """The page seen from above: white sheet, charts in their colours (k, 3), their outlines."""
+    extent = atlas.page.extent if atlas.size else np.ones(2)
+    sheet = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]) * extent
+    flat = np.concatenate([sheet, atlas.even_uv])
     height = np.concatenate([np.zeros(2), np.ones(len(atlas.faces))])
     positions = np.dstack([flat, np.broadcast_to(height[:, None, None], (*flat.shape[:2], 1))])
     normals = np.broadcast_to(np.array([0.0, 0.0, 1.0]), positions.shape)
     tones = np.concatenate([np.full((2, 3), SHEET[0], np.float32), colors[atlas.face_chart]])
-    outline = chart_outlines(atlas)
-    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float64)
+    outline = chart_outlines(atlas) * extent
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * extent
     flat_lines = np.concatenate([outline, np.stack([square, np.roll(square, -1, axis=0)], axis=1)])
     lines = np.concatenate([flat_lines, np.ones((*flat_lines.shape[:2], 1))], axis=2)
-    camera = Camera.fit(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]), np.eye(3))
+    camera = Camera.fit(np.array([[0.0, 0.0, 0.0], [*extent, 1.0]]), np.eye(3))
     return camera, Shape(positions, normals, flat, tones, lit=False), Lines(lines, INK, 1.2)
 
 

@@ -1,7 +1,7 @@
 """The surface per texel: an atlas rasterized in uv space once; every map is a function of the result.
 
 h w texels · f faces · n atlas vertices · e border edges.  Image row 0 is the top, uv is v up: the centre of texel
-(row, column) lies at u = (column + ½) / size, v = 1 − (row + ½) / size.  Positions are in source units.
+(row, column) lies at u = (column + ½) / width, v = 1 − (row + ½) / height.  Positions are in source units.
 
 Two draws.  Faces first, each texel whose centre they hold.  Then the borders of charts: each texel whose centre lies
 within `REACH` of a border, evaluated at the nearest point of it.  √½ is half a texel's diagonal, so that is every
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.pagesize import PageSize
 from .context import check_error, drawing_into, max_texture_size, moderngl
 from .layout import Layout, Planes, Window, windows
 from .shaders import build_program
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Atlas
+    from ...runtime.pagesize import Size
 
 REACH = 0.71
 """Texels; a little over √½."""
@@ -53,7 +55,7 @@ class GBuffer:
     position: (h, w, 3) float32, source units.  normal: (h, w, 3) float32, unit, interpolated from the atlas' vertex
     normals. second, third: (h, w) float32, barycentric weights of corners 1 and 2 of the face, in [0, 1], sum at most
     1. face: (h, w) int32, −1 where nothing is; there the other arrays are 0.
-    row, column: where this window begins in the image.  size: side of the image in texels, 0 = the height here.
+    row, column: where this window begins in the image.  size: of the image, None = that of this window.
     """
 
     position: NDArray[np.float32]
@@ -63,18 +65,18 @@ class GBuffer:
     face: NDArray[np.int32]
     row: int = 0
     column: int = 0
-    size: int = 0
+    size: PageSize | None = None
 
     @classmethod
-    def of(cls, planes: Planes, row: int = 0, column: int = 0, size: int = 0) -> GBuffer:
+    def of(cls, planes: Planes, row: int = 0, column: int = 0, size: PageSize | None = None) -> GBuffer:
         """Views of the planes."""
         position, normal, face = planes
         return cls(position[..., :3], normal[..., :3], position[..., 3], normal[..., 3], face, row, column, size)
 
     @property
-    def side(self) -> int:
-        """Side of the whole image in texels, of which this may be a window."""
-        return self.size or self.face.shape[0]
+    def page(self) -> PageSize:
+        """Size of the whole image, of which this may be a window."""
+        return self.size or PageSize(self.face.shape[1], self.face.shape[0])
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -103,7 +105,7 @@ class GBuffer:
     def image_texels(self, texels: NDArray[np.int64]) -> NDArray[np.int64]:
         """(t,) int64 flat indices in the whole image of flat indices in this window: seeds that no window changes."""
         row, column = np.divmod(texels, self.shape[1])
-        return (row + self.row) * self.side + column + self.column
+        return (row + self.row) * self.page.width + column + self.column
 
     def weights(self, texels: NDArray[np.int64]) -> NDArray[np.float32]:
         """(t, 3) float32 barycentric weights of the three corners at flat texel indices."""
@@ -131,22 +133,27 @@ class GBuffer:
 
 
 def rasterize(
-    context: moderngl.Context, atlas: Atlas, size: int, *, limit: int | None = None, planes: Planes | None = None
+    context: moderngl.Context,
+    atlas: Atlas,
+    size: Size | PageSize,
+    *,
+    limit: int | None = None,
+    planes: Planes | None = None,
 ) -> GBuffer:
-    """Draw the atlas into size × size texels.
+    """Draw the atlas into an image of that size.
 
     limit: the largest side drawn at once, in texels; it changes no bit.  planes: arrays of that size to draw into
     again, since new memory often takes longer than drawing.
     Raises: InputError for a size out of range, for uv outside [0, 1], for more faces than the device can hold.
     """
     layout = Layout.of(atlas, size)
-    pieces = windows(size, min(max_texture_size(context), limit or size), WINDOW)
-    planes = Planes.of(size, size) if planes is None else planes
+    pieces = windows(layout.page, min(max_texture_size(context), limit or layout.page.side), WINDOW)
+    planes = Planes.of(*layout.page.shape) if planes is None else planes
     with ExitStack() as stack:
         drawn = DeviceRasterizer(context, stack, atlas, layout, (pieces[0].height, pieces[0].width))
         for window in pieces:
             drawn.draw(window, planes.part(window.rows, window.columns))
-    return GBuffer.of(planes, size=size)
+    return GBuffer.of(planes, size=layout.page)
 
 
 def check_faces(context: moderngl.Context, count: int) -> None:
@@ -204,7 +211,7 @@ class DeviceRasterizer:
                 for attachment, plane in enumerate(into):
                     _read(frame, attachment, plane)
         check_error(self._context)
-        return GBuffer.of(into, window.row, window.column, self.layout.size)
+        return GBuffer.of(into, window.row, window.column, self.layout.page)
 
     def _cleared_frame(self, stack: ExitStack, *, clear: bool) -> moderngl.Framebuffer:
         """Over all targets: depth far, face −1 (drawn: moderngl clears floats only), floats 0 if clear."""

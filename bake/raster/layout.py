@@ -1,7 +1,7 @@
 """Where an atlas lies in an image: corners in texels, borders of charts, windows, and what they are drawn into.
 
 f faces · e border edges · h w texels.  Image row 0 is the top, uv is v up: a corner at (u, v) lies at
-x = u · size, y = (1 − v) · size texels, the centre of texel (row, column) at (column + ½, row + ½).
+x = u · width, y = (1 − v) · height texels, the centre of texel (row, column) at (column + ½, row + ½).
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.geometry.triangles import signed_areas
+from ...runtime.pagesize import PageSize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Atlas
+    from ...runtime.pagesize import Size
 
 LARGEST = 65536
 """Texels: the exact decisions of the rasterizers hold up to this side, supersampling included."""
@@ -49,30 +51,31 @@ class Window:
         return Window(by * self.row, by * self.column, by * self.height, by * self.width)
 
 
-def windows(size: int, side: int, texels: int) -> list[Window]:
-    """The image of size × size in windows, row by row: at most `side` wide and high, about `texels` texels each.
+def windows(size: Size | PageSize, side: int, texels: int) -> list[Window]:
+    """An image of that size in windows, row by row: at most `side` wide and high, about `texels` texels each.
 
     They are as wide as the image where that is allowed, since whole rows lie together in memory.
     """
-    width = min(size, side)
-    height = min(size, side, max(1, texels // width))
+    page = PageSize.of(size)
+    width = min(page.width, side)
+    height = min(page.height, side, max(1, texels // width))
     return [
-        Window(row, column, min(height, size - row), min(width, size - column))
-        for row in range(0, size, height)
-        for column in range(0, size, width)
+        Window(row, column, min(height, page.height - row), min(width, page.width - column))
+        for row in range(0, page.height, height)
+        for column in range(0, page.width, width)
     ]
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """An atlas laid into an image of size × size texels.
+    """An atlas laid into an image of page.width × page.height texels.
 
     texel: (f, 3, 2) float32 places of the corners, x right, y down.  edges: (e, 2) int32 as `border_edges`.
     face_bounds: (4, f) float32 left, top, right, bottom.  edge_bounds: (4, e) float32, likewise.
     radius: (f,) float32 radius of the inscribed circle, texels.
     """
 
-    size: int
+    page: PageSize
     texel: NDArray[np.float32]
     edges: NDArray[np.int32]
     face_bounds: NDArray[np.float32]
@@ -80,21 +83,22 @@ class Layout:
     radius: NDArray[np.float32]
 
     @classmethod
-    def of(cls, atlas: Atlas, size: int, tile: tuple[int, int] | None = None) -> Layout:
+    def of(cls, atlas: Atlas, size: Size | PageSize, tile: tuple[int, int] | None = None) -> Layout:
         """Lay out the unit square, or the UDIM tile of uv [a, a + 1] × [b, b + 1] for tile (a, b).
 
         Raises: InputError for a size out of range, or uv outside [0, 1] where no tile is given.
         """
-        check_size(size)
+        page = PageSize.of(size)
+        check_size(page)
         if tile is None:
             check_uv(atlas.uv)
-        place = (atlas.uv.astype(np.float64) - (tile or (0, 0))) * size
-        place[:, 1] = size - place[:, 1]
+        place = (atlas.uv.astype(np.float64) - (tile or (0, 0))) * page
+        place[:, 1] = page.height - place[:, 1]
         texel, edges = place.astype(np.float32)[atlas.faces], border_edges(atlas.faces, atlas.uv)
         face, corner = edges.T
         ends = (texel[face, corner], texel[face, (corner + 1) % 3])
         bounds = _bounds(texel[:, 0], texel[:, 1], texel[:, 2])
-        return cls(size, texel, edges, bounds, _bounds(*ends), _inscribed_radius(texel))
+        return cls(page, texel, edges, bounds, _bounds(*ends), _inscribed_radius(texel))
 
     def faces_in(self, window: Window) -> NDArray[np.int32]:
         """(a,) int32 faces whose bounds meet the window, ascending."""
@@ -132,10 +136,11 @@ class Planes(NamedTuple):
         return Planes(self.position[rows, columns], self.normal[rows, columns], self.face[rows, columns])
 
 
-def check_size(size: int) -> None:
-    """Raise InputError unless an image of size × size texels can be made."""
-    if not 1 <= size <= LARGEST:
-        raise InputError(f"size {size}: expected 1 to {LARGEST} texels a side; choose a size in that range")
+def check_size(size: Size | PageSize) -> None:
+    """Raise InputError unless an image of that size can be made."""
+    page = PageSize.of(size)
+    if min(page) < 1 or page.side > LARGEST:
+        raise InputError(f"size {page.stored}: expected 1 to {LARGEST} texels a side; choose a size in that range")
 
 
 def check_uv(uv: NDArray[np.floating]) -> None:

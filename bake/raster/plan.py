@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from ...runtime.mesh import Atlas
+    from ...runtime.pagesize import PageSize
 
 Device = Literal["auto", "opengl", "software"]
 DEVICES: tuple[Device, ...] = ("auto", "opengl", "software")
@@ -45,21 +46,26 @@ class Rasterizer(Protocol):
 class Plan:
     """How an image is cut into windows.
 
-    size: texels per side.  samples: 1, 4 or 16 per texel.
+    size: of the image.  samples: 1, 4 or 16 per texel.
     limit: the largest side that is drawn at once, in samples; None leaves it to the device.
     tile: the UDIM tile (a, b), uv [a, a + 1] × [b, b + 1]; None is the unit square, and uv must be inside.
 
     Raises: InputError for a value out of range.
     """
 
-    size: int
+    size: PageSize
     samples: int = 1
     limit: int | None = None
     tile: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         check_size(self.size)
-        check_size(self.size * self.along)
+        check_size(self.fine)
+
+    @property
+    def fine(self) -> PageSize:
+        """Size of the image in samples."""
+        return self.size.times(self.along)
 
     @property
     def along(self) -> int:
@@ -90,7 +96,7 @@ def open_rasterizer(
     """
     if device not in DEVICES:
         raise InputError(f"device {device!r}: expected one of {', '.join(DEVICES)}")
-    layout = Layout.of(atlas, plan.size * plan.along, plan.tile)
+    layout = Layout.of(atlas, plan.fine, plan.tile)
     with ExitStack() as stack:
         if device != "software":
             try:
@@ -104,7 +110,7 @@ def open_rasterizer(
                 pieces = plan.windows(limit)
                 yield DeviceRasterizer(context, stack, atlas, layout, plan.capacity(pieces)), pieces
                 return
-        yield SoftwareRasterizer(atlas, layout), plan.windows(plan.size * plan.along)
+        yield SoftwareRasterizer(atlas, layout), plan.windows(plan.fine.side)
 
 
 def _say(message: str, warn: Callable[[str], None] | None) -> None:

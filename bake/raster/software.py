@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Atlas
+    from ...runtime.pagesize import PageSize, Size
 
 ONE = 256
 """Units of snapped places in a texel."""
@@ -28,13 +29,13 @@ SPANS = 1 << 20
 FAR = np.iinfo(np.int64).max
 
 
-def rasterize_in_software(atlas: Atlas, size: int, *, limit: int | None = None) -> GBuffer:
+def rasterize_in_software(atlas: Atlas, size: Size | PageSize, *, limit: int | None = None) -> GBuffer:
     """The whole image, as `gbuffer.rasterize`.  Raises: InputError for a size out of range, or as the rasterizer."""
-    drawn = SoftwareRasterizer(atlas, Layout.of(atlas, size))
-    planes = Planes.of(size, size)
-    for window in windows(size, limit or size, WINDOW):
+    layout = Layout.of(atlas, size)
+    drawn, planes = SoftwareRasterizer(atlas, layout), Planes.of(*layout.page.shape)
+    for window in windows(layout.page, limit or layout.page.side, WINDOW):
         drawn.draw(window, planes.part(window.rows, window.columns))
-    return GBuffer.of(planes, size=size)
+    return GBuffer.of(planes, size=layout.page)
 
 
 class SoftwareRasterizer:
@@ -59,7 +60,7 @@ class SoftwareRasterizer:
         self._write(into, texels, face[texels], self._inside_weights(face[texels], texels, window))
         texels, owner, corner = self._nearest_edges(face, window)
         self._write(into, texels, owner, self._edge_weights(owner, corner, texels, window))
-        return GBuffer.of(into, window.row, window.column, self.layout.size)
+        return GBuffer.of(into, window.row, window.column, self.layout.page)
 
     def _fill_faces(self, face: NDArray[np.int32], window: Window) -> None:
         """Each texel of face (h · w,) whose centre a face holds becomes the lowest such face."""

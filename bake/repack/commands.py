@@ -41,7 +41,7 @@ def pack(
     if not mesh:
         raise InputError("MESH is missing, expected a mesh with uv; see flexpara pack --help")
     light = outputs.uv_set is not None
-    options = replace(options, padding=padding_of(options.padding, outputs.target, options.size, light=light))
+    options = replace(options, padding=padding_of(options.padding, outputs.target, options.page.side, light=light))
     from ...runtime.files import OutputFolder
     from ...runtime.io.asset.changes import lost, told
     from ...runtime.io.asset.shading import shaded

@@ -9,13 +9,10 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.io.asset.pages import part_of
-from ...runtime.options.unwrap import SCENES
 from ...runtime.pack.packing import atlas_of_corners
 from ...runtime.pack.pages import ACROSS
-from ..checks import check_outputs
-from ..results.meshes import MeshJob, write_meshes
-from ..results.output import gutter_of
 from ..results.pages import check_pages, page_jobs, page_notes, write_pages
+from ..results.tiles import tile_notes, write_tiles
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +21,6 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.pack import PackOutputs
     from ...runtime.progress import Clock
-    from ..results.output import BakeJob
     from .repacked import PackResult
 
 
@@ -33,51 +29,13 @@ def write_on_tiles(
 ) -> dict[str, Any]:
     """Meshes whose uv lie in UDIM tiles, and an image for each map and tile; the report.
 
-    Raises: InputError for formats and options that know no tiles.
+    Raises: as `tiles.write_tiles`.
     """
-    from ..results.udim import udim_names, udim_tiles, write_udim
-
     whole, pieces = result.jobs(replace(outputs, preview=False))
-    _refuse_untiled(whole, pieces)
-    kind, stem, tiles = whole.outputs.texture_format, result.asset.stem, udim_tiles(result.atlas)
-    maps = {entry.name: entry for entry in whole.maps}
-    named = [file for number in tiles for file in udim_names(maps, stem, number, file_type=kind).values()]
-    meshes = [f"{piece.asset.stem}.{ending}" for piece in pieces for ending in piece.outputs.formats]
-    check_outputs(output, replace(whole.outputs, report=False), [], meshes=False, more=[*named, *meshes])
-    baked = _baked_tiles(whole, clock)
-    files = udim_names(maps, stem, file_type=kind)
-    output.write_several(lambda folder: write_udim(baked, folder, stem, file_type=kind) if maps else [])
-    written: dict[str, Any] = {}
-    with clock.stage("write"):
-        for piece in pieces:
-            facts = write_meshes(output, MeshJob(piece.atlas, piece.asset, piece.outputs, {}, files))
-            prefix = f"{piece.asset.stem}." if len(pieces) > 1 else ""
-            written |= {f"{prefix}{ending}": found for ending, found in facts.items()}
-    note(f"{stem}: tiles {tiles[0]} to {tiles[-1]}")
-    facts = {"outputs": asdict(whole.outputs), "written": written, "tiles": tiles, "textures": {"files": files}}
-    return {**result.report, **facts}
-
-
-def _baked_tiles(job: BakeJob, clock: Clock) -> dict[int, Any]:
-    from ..results.udim import bake_udim
-
-    if not job.maps:
-        return {}
-    with clock.stage("bake"):
-        asked = {"size": job.atlas.size, "samples": job.outputs.samples, "denoise": job.outputs.denoise}
-        return bake_udim(job.atlas, job.asset, list(job.maps), padding=gutter_of(job.atlas, job.outputs), **asked)
-
-
-def _refuse_untiled(whole: BakeJob, pieces: list[BakeJob]) -> None:
-    """Raises: InputError for what knows no UDIM."""
-    found = sorted({kind for piece in pieces for kind in piece.outputs.formats} & set(SCENES))
-    if found:
-        raise InputError(
-            f"format {', '.join(found)} with udim, which glTF does not know, expected obj, ply, usda or npz; pass for "
-            "instance --format obj, or leave --udim out"
-        )
-    if whole.outputs.layers or whole.outputs.target is not None or whole.outputs.report:
-        raise InputError("udim with layers, a target or report, expected none of them; leave them out")
+    report = {**result.report, **write_tiles(output, whole, pieces, clock)}
+    for fact in tile_notes(report, result.asset.stem):
+        note(fact)
+    return report
 
 
 def write_on_pages(

@@ -17,9 +17,10 @@ from ...runtime.options.pack import PackOptions, PackOutputs
 from ...runtime.pack.repack import repack, repack_pages
 from ...runtime.pack.square import square_of
 from ...runtime.progress import Clock
+from ...runtime.saving import Saving
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
-from ..results.output import BakeJob, texture_notes, write_outputs
+from ..results.output import BakeJob, stack_notes, texture_notes, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +37,7 @@ TOGETHER = "packed"
 
 
 @dataclass(frozen=True, eq=False)
-class PackResult:
+class PackResult(Saving[PackOutputs]):
     """Meshes whose islands share a page.
 
     assets: the meshes as read and cleaned.  suffixes: endings of their files.  asset: all of them as one mesh.
@@ -56,31 +57,9 @@ class PackResult:
         """The atlas of each mesh."""
         return parted(self.atlas, self.assets)
 
-    def save(
-        self,
-        folder: str | Path,
-        outputs: PackOutputs | None = None,
-        *,
-        force: bool = False,
-        progress: Progress | None = None,
-        **keywords: Any,
-    ) -> tuple[Path, ...]:
-        """Write the meshes, the textures baked onto the new uv, preview and report, all or none; returns their paths.
-
-        Args:
-            folder: made where it is absent.
-            outputs: what is written; None: its defaults.
-            force: whether files are overwritten that flexpara did not write.
-            progress: called as progress(stage, step, steps, loss).
-            **keywords: fields of `PackOutputs`, in place of those of outputs: maps=(), formats=("glb",), …
-
-        Raises: as `UnwrapResult.save`.
-        """
-        from ...runtime.files import OutputFolder
-
-        outputs = from_keywords(PackOutputs, outputs, keywords)
-        with OutputFolder(Path(folder), self.asset.stem, force=force) as output:
-            return self.write(output, outputs, Clock(progress))
+    def outputs_kind(self) -> type[PackOutputs]:
+        """Those of packing."""
+        return PackOutputs
 
     def jobs(self, outputs: PackOutputs) -> tuple[BakeJob, list[BakeJob]]:
         """What is baked, all meshes as one, and what is written: each mesh for itself, with the same maps.
@@ -97,15 +76,20 @@ class PackResult:
         ]
 
     def write(
-        self, output: OutputFolder, outputs: PackOutputs, clock: Clock, note: Callable[[str], None] = lambda _: None
+        self,
+        output: OutputFolder,
+        outputs: PackOutputs,
+        progress: Progress | None = None,
+        note: Callable[[str], None] | None = None,
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact that a user should know."""
         from ...runtime.io.asset.changes import told
         from .pages import write_on_pages, write_on_tiles
 
+        clock, say = Clock.of(progress), note or (lambda _: None)
         if self.page is not None:
             write = write_on_tiles if self.report["settings"]["udim"] else write_on_pages
-            output.write_report({**write(self, output, outputs, clock, note), "seconds": clock.rounded})
+            output.write_report({**write(self, output, outputs, clock, say), "seconds": clock.rounded})
             return output.commit()
         whole, pieces = self.jobs(outputs)
         named = [f"{piece.asset.stem}.{kind}" for piece in pieces for kind in piece.outputs.formats]
@@ -115,10 +99,8 @@ class PackResult:
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
         cut = {"polygons_cut": report.pop("polygons_cut")}
         report["changes"] = {**report["changes"], **(cut if any(cut.values()) else {})}
-        stacked = self.report["pack"].get("stacked", 0)
-        shared = [f"{stacked} islands lie on others and share their texels"] if stacked else []
-        for fact in (*told(cut), *shared, *texture_notes(report["textures"])):
-            note(f"{self.asset.stem}: {fact}")
+        for fact in (*told(cut), *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):
+            say(f"{self.asset.stem}: {fact}")
         output.write_report({**report, "seconds": clock.rounded})
         return output.commit()
 

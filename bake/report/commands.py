@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 MARK = b'<meta name="generator" content="flexpara'
 """Stands near the top of every report: such a file may be replaced."""
+SEVERAL = "results"
+"""Base name of the report of a folder's results."""
 
 
 def report(
@@ -28,34 +30,37 @@ def report(
 
     Args:
         result: Output folders of unwrap, STEM.report.json files in them, or meshes with uv of any tool.
-        output: The file to write; by default STEM.report.html in the folder, where there is one result.
+        output: The file to write; by default STEM.report.html in the folder, or
+            results.report.html where it holds several.
         console: See Console.
     """
     from ...runtime.files import write_whole
     from .gather import results_in
     from .page import write_page
+    from .result import BEFORE
 
     if not result:
         raise InputError("RESULT is missing, expected an output folder of unwrap; see flexpara report --help")
     results = results_in(result)
-    title = results[-1].title if len(result) == 1 else " · ".join(entry.title for entry in results)
+    shown = [entry.title for entry in results if entry.title != BEFORE] or [entry.title for entry in results]
+    title = " · ".join(shown)
     if output is None:
-        output = folder_of(list(result), len(results)) / f"{title}.report.html"
+        output = folder_of(result) / f"{title if len(shown) == 1 else SEVERAL}.report.html"
     own = output.is_file() and MARK in output.read_bytes()[:1000]
     written = write_whole(output, lambda path: write_page(results, title, path), force=console.force or own)
     console.show({}, [written])
     return 0
 
 
-def folder_of(named: Sequence[Path], results: int) -> Path:
-    """The output folder of the one result that was named.  results: how many were found, an earlier layout counted.
+def folder_of(named: Sequence[Path]) -> Path:
+    """The one output folder that was named, or that of the report that was.
 
     Raises: InputError where there are several, or a mesh that lies in no such folder.
     """
     from .gather import REPORT
 
     first = named[0]
-    if len(named) > 1 or results > 2 or not (first.is_dir() or first.name.endswith(REPORT)):
+    if len(named) > 1 or not (first.is_dir() or first.name.endswith(REPORT)):
         found = f"no output for {', '.join(map(str, named))}"
         raise InputError(f"{found}, expected a file for the comparison; pass for instance -o compare.html")
     return first if first.is_dir() else first.parent

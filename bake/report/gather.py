@@ -114,7 +114,7 @@ def before_of(asset: Asset, uv: NDArray[np.float64] | None, after: Result) -> li
     """The uv that the mesh came with as a result of its own, where they are a layout."""
     if uv is None or not np.isfinite(uv).all() or not np.abs(signed_areas(uv[asset.faces])).sum() > 0.0:
         return []
-    return [measured(BEFORE, Shape.of_asset(asset, uv), after.mesh, after.size)]
+    return [measured(BEFORE, Shape.of_asset(asset, uv), after.mesh, after.page)]
 
 
 def _demand_room(results: Sequence[Result], settings: ReportSettings) -> None:

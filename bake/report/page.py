@@ -94,7 +94,7 @@ def packed(values: NDArray[Any]) -> dict[str, str]:
 
 
 def _result_data(result: Result, top: float) -> dict[str, Any]:
-    """One result: positions in the unit ball, uv, and facts of faces."""
+    """One result: positions in the unit ball, uv in sides of the page, and facts of faces."""
     shape, facts, frame = result.shape, result.facts, Frame.of(result.shape.positions)
     chart_type = np.uint16 if facts.chart.max() < 1 << 16 else np.uint32
     level = np.round((facts.heat(top) + 1.0) * 0.5 * (LEVELS - 1))
@@ -102,13 +102,14 @@ def _result_data(result: Result, top: float) -> dict[str, Any]:
         "title": result.title,
         "mesh": result.mesh,
         "size": result.size,
+        "extent": shape.extent.tolist(),
         "cleanMip": result.metrics.get("bleed_free_mip"),
         "pictures": dict(result.pictures),
         "unit": 1.0 / frame.scale,
         "arrays": {
             "positions": packed(frame.apply(shape.positions).astype(np.float32)),
             "normals": packed(np.round(shape.normals * 127.0).astype(np.int8)),
-            "uv": packed(shape.uv.astype(np.float32)),
+            "uv": packed((shape.uv * shape.extent).astype(np.float32)),
             "faces": packed(shape.faces.astype(np.uint32)),
             "charts": packed(facts.chart.astype(chart_type)),
             "colors": packed(srgb_bytes_from_linear(chart_colors(int(facts.chart.max()) + 1))),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
 from ...runtime.io.asset.changes import told
+from ...runtime.pagesize import PageSize
 from .pictures import picture_file
 from .shape import FaceFacts, Shape, face_facts
 from .words import number_of
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
 BEFORE = "before"
 """How the uv that a mesh came with are called."""
 MOST_PICTURES = 40
+LARGEST = 1 << 16
+"""Texels of a side that a report may name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +31,8 @@ class Result:
     """One result.
 
     title: what it is called.  mesh: results of the same word have the same faces in the same order.
-    metrics, seconds: name → number.  pictures: map → data address.  notes: sentences.  size: side of the atlas in
-    texels, where it is known.
+    metrics, seconds: name → number.  pictures: map → data address.  notes: sentences.  size: longer side of the
+    page in texels, where it is known.
     """
 
     title: str
@@ -40,11 +45,29 @@ class Result:
     notes: tuple[str, ...] = ()
     size: int | None = None
 
+    @property
+    def page(self) -> PageSize | None:
+        """The page as far as it is known."""
+        if self.size is None:
+            return None
+        width, height = np.rint(self.size * self.shape.extent).astype(int).tolist()
+        return PageSize(width, height)
 
-def measured(title: str, shape: Shape, mesh: str, size: int | None = None) -> Result:
+
+def measured(title: str, shape: Shape, mesh: str, page: PageSize | None = None) -> Result:
     """A layout of which nothing is known but itself, measured.  Raises: InputError as `metrics.measure`."""
-    metrics = measure(shape.surface, shape.corner_uv, size=size).to_dict()
-    return Result(title, shape, face_facts(shape), mesh, metrics, size=size)
+    shape = shape if page is None else replace(shape, extent=page.extent)
+    metrics = measure(shape.surface, shape.corner_uv, size=None if page is None else page.stored).to_dict()
+    return Result(title, shape, face_facts(shape), mesh, metrics, size=None if page is None else page.side)
+
+
+def page_in(value: object) -> PageSize | None:
+    """The size that a report names, which may be anything; None for what is none."""
+    try:
+        page = PageSize.of(value if isinstance(value, str) else int(number_of(value) or 0))
+    except InputError:
+        return None
+    return page if min(page) >= 1 and page.side <= LARGEST else None
 
 
 def reported(title: str, shape: Shape, report: Mapping[str, Any], folder: Path, picture_size: int) -> Result:
@@ -54,20 +77,19 @@ def reported(title: str, shape: Shape, report: Mapping[str, Any], folder: Path, 
     Raises: InputError as `metrics.measure`.
     """
     settings, source = part(report, "settings"), part(report, "source")
-    size = number_of(settings.get("size"))
-    texels = int(size) if size is not None and 1 <= size <= 1 << 16 else None
-    fresh = measured(title, shape, f"{source.get('sha256')} {len(shape.faces)}", texels)
+    page = page_in(settings.get("size"))
+    fresh = measured(title, shape, f"{source.get('sha256')} {len(shape.faces)}", page)
     pictures, notes = _pictures(part(part(report, "textures"), "files"), folder, picture_size)
     return Result(
         title,
-        shape,
+        fresh.shape,
         fresh.facts,
         fresh.mesh,
         {**numbers(part(report, "network")), **fresh.metrics},
         {name: value for name, value in numbers(part(report, "seconds")).items() if value >= 0.0},
         pictures,
         (*_said(report), *notes),
-        texels,
+        fresh.size,
     )
 
 

@@ -5,7 +5,7 @@ n vertices, split along seams · f faces · s seam segments · k charts.  Positi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +33,7 @@ class Shape:
     """A mesh with uv.
 
     positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float64.  normals: (n, 3) float32 unit.
-    surface: the same faces over welded vertices.
+    surface: the same faces over welded vertices.  extent: (2,) of the page, its longer side 1.
     """
 
     positions: NDArray[np.float64]
@@ -41,11 +41,14 @@ class Shape:
     uv: NDArray[np.float64]
     normals: NDArray[np.float32]
     surface: Surface
+    extent: NDArray[np.float64] = field(default_factory=lambda: np.ones(2))
 
     @classmethod
     def of_atlas(cls, atlas: Atlas, asset: Asset) -> Shape:
         """An atlas as it is written."""
-        return cls(atlas.positions, atlas.faces, atlas.uv.astype(np.float64), atlas.normals, asset.surface)
+        return cls(
+            atlas.positions, atlas.faces, atlas.uv.astype(np.float64), atlas.normals, asset.surface, atlas.page.extent
+        )
 
     @classmethod
     def of_asset(cls, asset: Asset, uv: NDArray[np.float64]) -> Shape:
@@ -57,6 +60,11 @@ class Shape:
     def corner_uv(self) -> NDArray[np.float64]:
         """(f, 3, 2) float64."""
         return self.uv[self.faces]
+
+    @property
+    def even_uv(self) -> NDArray[np.float64]:
+        """(f, 3, 2) float64 in sides of the page."""
+        return self.corner_uv * self.extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +99,13 @@ class FaceFacts:
 
 def face_facts(shape: Shape) -> FaceFacts:
     """What is true of each face.  Raises: InputError as `metrics.measure`."""
-    corner_uv, surface = shape.corner_uv, shape.surface
-    energy = face_distortion(surface, corner_uv)
-    area, flat = triangle_areas(surface.triangles), signed_areas(corner_uv)
+    corner_uv, even_uv, surface = shape.corner_uv, shape.even_uv, shape.surface
+    energy = face_distortion(surface, even_uv)
+    area, flat = triangle_areas(surface.triangles), signed_areas(even_uv)
     scale = np.sqrt(area.sum() / np.abs(flat).sum())
     solid = area > 0.0
     stretch = np.ones((len(area), 2))
-    stretch[solid] = singular_values(jacobians(surface.triangles[solid], corner_uv[solid] * scale)).T
+    stretch[solid] = singular_values(jacobians(surface.triangles[solid], even_uv[solid] * scale)).T
     chart, seam = uv_charts(surface.faces, corner_uv)
     table = edge_table(surface.faces)
     corners = np.stack([shape.faces, np.roll(shape.faces, -1, axis=1)], axis=2)

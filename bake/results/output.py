@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 import warnings
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from ...runtime.options.unwrap import Outputs
     from ...runtime.progress import Clock
     from ..bakemap import BakeMap
+    from ..settings import BakeSettings
     from ..texture import Texture
 
 LARGE = 8192
@@ -106,17 +108,32 @@ def bake_textures(output: OutputFolder, job: BakeJob, clock: Clock) -> Baked:
     from .. import baker
 
     names = [entry.name for entry in job.maps]
-    textures = baker.bake(
-        job.atlas,
-        job.asset,
-        list(job.maps),
+    tell = partial(_tell_map, clock, names)
+    textures = baker.bake(job.atlas, job.asset, list(job.maps), bake_settings(job), progress=tell)
+    clock("bake", len(names), len(names))
+    return write_baked(output, job, textures, clock)
+
+
+def _tell_map(clock: Clock, names: Sequence[str], name: str) -> None:
+    clock("bake", names.index(name), len(names))
+
+
+def bake_settings(job: BakeJob) -> BakeSettings:
+    """How its maps become images."""
+    from ..settings import BakeSettings
+
+    return BakeSettings(
         padding=gutter_of(job.atlas, job.outputs),
         samples=job.outputs.samples,
         denoise=job.outputs.denoise,
-        scratch=Path(tempfile.gettempdir()) if job.atlas.size >= LARGE else None,
-        progress=lambda name: clock("bake", names.index(name), len(names)),
+        scratch=Path(tempfile.gettempdir()) if job.atlas.page.side >= LARGE else None,
     )
-    clock("bake", len(names), len(names))
+
+
+def write_baked(output: OutputFolder, job: BakeJob, textures: dict[str, Texture], clock: Clock) -> Baked:
+    """The files of what was baked."""
+    if not textures:
+        return Baked({}, {})
     with clock.stage("write textures"):
         return Baked(textures, _write_files(output, textures, job.asset, job.outputs))
 
@@ -193,6 +210,12 @@ def result_notes(report: Mapping[str, Any]) -> list[str]:
     return [*written_notes(report["written"]), *texture_notes(report["textures"])]
 
 
+def stack_notes(packing: Mapping[str, Any]) -> list[str]:
+    """A line where charts were laid on others."""
+    count = packing.get("stacked", 0)
+    return [f"{count} charts lie on others and share their texels"] if count else []
+
+
 def texture_notes(facts: Mapping[str, Any]) -> list[str]:
     """What a user should know of the textures: a line for each map that is the same all over."""
     return [
@@ -201,12 +224,12 @@ def texture_notes(facts: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def bleeding(atlas: Atlas, size: int, padding: int | None) -> int:
-    """The highest mip level of such textures at which no chart takes in another's texels."""
+def bleeding(atlas: Atlas, padding: int | None) -> int:
+    """The highest mip level of its textures at which no chart takes in another's texels."""
     from ..baker import chart_labels
     from ..seams.seamcheck import clean_mip
 
-    return clean_mip(chart_labels(atlas, size, padding), atlas)
+    return clean_mip(chart_labels(atlas, atlas.size, padding), atlas)
 
 
 def write_preview(output: OutputFolder, atlas: Atlas, asset: Asset) -> None:

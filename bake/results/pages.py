@@ -5,11 +5,14 @@ OpenGL and image libraries are imported when something needs them.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..checks import check_outputs, chosen_maps, possible_files
 from .meshes import MeshJob, write_scenes
-from .output import BakeJob, bake_textures, texture_facts, texture_notes, write_preview, written_notes
+from .output import BakeJob, bake_settings, texture_facts, texture_notes, write_baked, write_preview, written_notes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.unwrap import Outputs
     from ...runtime.progress import Clock
+    from ..texture import Texture
 
 
 def check_pages(output: OutputFolder, outputs: Outputs, pages: Iterable[Asset]) -> None:
@@ -47,8 +51,8 @@ def write_pages(output: OutputFolder, jobs: Sequence[BakeJob], clock: Clock, *, 
     apart: whether in no page two triangles are known to overlap.
     """
     facts, files = dict[str, Any](), list[MeshJob]()
-    for job in jobs:
-        baked = bake_textures(output, job, clock)
+    for job, textures in zip(jobs, _baked(jobs, clock), strict=True):
+        baked = write_baked(output, job, textures, clock)
         facts[job.asset.stem] = texture_facts(job.atlas, baked)
         files.append(MeshJob(job.atlas, job.asset, job.outputs, baked.textures, baked.files))
         if job.outputs.preview:
@@ -56,6 +60,37 @@ def write_pages(output: OutputFolder, jobs: Sequence[BakeJob], clock: Clock, *, 
                 write_preview(output, job.atlas, job.asset)
     with clock.stage("write"):
         return {"textures": facts, "written": write_scenes(output, files, apart=apart)}
+
+
+def _baked(jobs: Sequence[BakeJob], clock: Clock) -> list[dict[str, Texture]]:
+    """The maps of each page; seams between pages are closed."""
+    if not any(job.maps for job in jobs):
+        return [{} for _ in jobs]
+    from ..baker import Part, bake_together
+    from ..windows import Ground
+
+    parts = [
+        Part(Ground(job.atlas, job.asset), job.maps, bake_settings(job), (number, 0)) for number, job in enumerate(jobs)
+    ]
+    with clock.stage("bake"):
+        return bake_together(side_by_side([job.atlas for job in jobs]), parts)
+
+
+def side_by_side(atlases: Sequence[Atlas]) -> Atlas:
+    """Several atlases of one size as one, whose uv lie in tiles (0, 0), (1, 0), …; float64, for look-ups alone."""
+    first = np.cumsum([0, *(len(atlas.positions) for atlas in atlases)])
+    chart = np.cumsum([0, *(int(atlas.face_chart.max(initial=-1)) + 1 for atlas in atlases)])
+    number = range(len(atlases))
+    return replace(
+        atlases[0],
+        positions=np.concatenate([atlas.positions for atlas in atlases]),
+        normals=np.concatenate([atlas.normals for atlas in atlases]),
+        uv=np.concatenate([atlases[place].uv + np.array([float(place), 0.0]) for place in number]),
+        faces=np.concatenate([atlases[place].faces + first[place] for place in number]),
+        face_chart=np.concatenate([atlases[place].face_chart + chart[place] for place in number]),
+        source_vertex=np.concatenate([atlas.source_vertex for atlas in atlases]),
+        placement=None,
+    )
 
 
 def page_notes(facts: dict[str, Any]) -> list[str]:

@@ -13,10 +13,11 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.options.keywords import from_keywords
-from ..baker import bake
+from ..baker import Part, bake_together, find_maps
 from ..files.images import write_texture
 from ..files.textures import texture_names
 from ..settings import BakeSettings
+from ..windows import Ground
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -64,12 +65,15 @@ def tile_of(number: int) -> tuple[int, int]:
 def bake_udim(
     atlas: Atlas, asset: Asset, maps: Sequence[str | BakeMap], settings: BakeSettings | None = None, **keywords: Any
 ) -> dict[int, dict[str, Texture]]:
-    """Tile number → name → Texture, as `baker.bake` with the same settings, one call for each tile.
+    """Tile number → name → Texture, as `baker.bake` with the same settings; seams between tiles are closed too.
 
     Raises: as `udim_tiles` and `baker.bake`.
     """
-    made = from_keywords(BakeSettings, settings, keywords)
-    return {number: bake(atlas, asset, maps, replace(made, tile=tile_of(number))) for number in udim_tiles(atlas)}
+    made, numbers = from_keywords(BakeSettings, settings, keywords), udim_tiles(atlas)
+    chosen, ground = find_maps(maps, normal_format=made.normal_format), Ground(atlas, asset)
+    tiles = [tile_of(number) for number in numbers]
+    parts = [Part(ground, chosen, replace(made, tile=tile), tile) for tile in tiles]
+    return dict(zip(numbers, bake_together(atlas, parts), strict=True))
 
 
 def udim_names(

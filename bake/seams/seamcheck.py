@@ -9,11 +9,12 @@ Creases (the normals of the two sides differ) are left out: what depends on the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...runtime.geometry.rows import equal_rows, first_of_each
+from ...runtime.pagesize import PageSize
 from ..raster.layout import border_edges
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Atlas
+    from ...runtime.pagesize import Size
     from ..texture import Texture
 
 PER_TEXEL = 2.0
@@ -129,24 +131,31 @@ def _border_uv(atlas: Atlas, borders: NDArray[np.int64]) -> NDArray[np.float64]:
     return atlas.uv[ends].astype(np.float64)
 
 
-def sample_seams(seams: NDArray[np.float64], size: int) -> SeamSamples:
-    """Samples along seams (e, 2, 2, 2) in an image of size × size, evenly, at least two an edge."""
-    length = np.linalg.norm(seams[:, :, 1] - seams[:, :, 0], axis=2).max(axis=1, initial=0.0) * size
+def page_of(image: NDArray[Any]) -> PageSize:
+    """Size of an image (h, w, …)."""
+    return PageSize(image.shape[1], image.shape[0])
+
+
+def sample_seams(seams: NDArray[np.float64], size: Size | PageSize) -> SeamSamples:
+    """Samples along seams (e, 2, 2, 2) in an image of that size, evenly, at least two an edge."""
+    page = PageSize.of(size)
+    length = np.linalg.norm((seams[:, :, 1] - seams[:, :, 0]) * page, axis=2).max(axis=1, initial=0.0)
     edge, place = _along(length)
     uv = seams[edge, :, 0] + place[:, None, None] * (seams[edge, :, 1] - seams[edge, :, 0])
-    sides = [footprint(uv[:, side], size) for side in (0, 1)]
+    sides = [footprint(uv[:, side], page) for side in (0, 1)]
     texel = np.concatenate([side[0] for side in sides], axis=1)
     return SeamSamples(texel, np.concatenate([sides[0][1], -sides[1][1]], axis=1))
 
 
-def footprint(uv: NDArray[np.float64], size: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def footprint(uv: NDArray[np.float64], size: Size | PageSize) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """(s, 4) flat texels and their bilinear weights at uv (s, 2), v up; the image's rim is repeated outwards."""
-    x, y = uv[:, 0] * size - 0.5, (1.0 - uv[:, 1]) * size - 0.5
+    width, height = PageSize.of(size)
+    x, y = uv[:, 0] * width - 0.5, (1.0 - uv[:, 1]) * height - 0.5
     left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     across, down = x - left, y - top
-    columns = [np.clip(left + i, 0, size - 1) for i in (0, 1)]
-    rows = [np.clip(top + i, 0, size - 1) for i in (0, 1)]
-    texel = np.stack([row * size + column for row in rows for column in columns], axis=1)
+    columns = [np.clip(left + i, 0, width - 1) for i in (0, 1)]
+    rows = [np.clip(top + i, 0, height - 1) for i in (0, 1)]
+    texel = np.stack([row * width + column for row in rows for column in columns], axis=1)
     weight = np.stack([a * b for a in (1.0 - down, down) for b in (1.0 - across, across)], axis=1)
     return texel, weight
 
@@ -176,7 +185,7 @@ def seam_report(atlas: Atlas, textures: Mapping[str, Texture]) -> dict[str, dict
     for name, texture in textures.items():
         error = None
         if agrees_across_seams(name, texture.metadata.get("space", "")):
-            error = seam_error(texture, sample_seams(seams, texture.pixels.shape[0]))
+            error = seam_error(texture, sample_seams(seams, page_of(texture.pixels)))
         if error is not None:
             report[name] = {"max": error.maximum, "p99": error.p99}
     return report
@@ -185,23 +194,24 @@ def seam_report(atlas: Atlas, textures: Mapping[str, Texture]) -> dict[str, dict
 def clean_mip(labels: NDArray[np.int32], atlas: Atlas) -> int:
     """The highest mip level at which bilinear samples on the borders of charts see their own chart alone.
 
-    labels: (size, size) int32, the chart of each texel, gutters included, −1 beyond them.  Levels are halved by boxes,
-    as long as the size is even.  −1 where not even the full image is free of bleeding.
+    labels: (h, w) int32, the chart of each texel, gutters included, −1 beyond them.  Levels are halved by boxes,
+    as long as both sides are even.  −1 where not even the full image is free of bleeding.
     """
     borders = _uv_borders(atlas)[1]
     ends = _border_uv(atlas, borders)
-    edge, place = _along(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * labels.shape[0])
+    edge, place = _along(np.linalg.norm((ends[:, 1] - ends[:, 0]) * page_of(labels), axis=1))
     uv = ends[edge, 0] + place[:, None] * (ends[edge, 1] - ends[edge, 0])
     chart, low, high, level = atlas.face_chart[borders[edge, 0]], labels, labels, -1
     while True:
-        texel, weight = footprint(uv, len(low))
+        texel, weight = footprint(uv, page_of(low))
         own = (low.reshape(-1)[texel] == chart[:, None]) & (high.reshape(-1)[texel] == chart[:, None])
         if not (own | (weight < 1e-6)).all():
             return level
         level += 1
-        if len(low) % 2:
+        height, width = low.shape
+        if height % 2 or width % 2:
             return level
-        blocks = (len(low) // 2, 2, len(low) // 2, 2)
+        blocks = (height // 2, 2, width // 2, 2)
         low, high = low.reshape(blocks).min(axis=(1, 3)), high.reshape(blocks).max(axis=(1, 3))
 
 

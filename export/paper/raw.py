@@ -15,6 +15,8 @@ import numpy as np
 import torch
 
 from ...runtime.mesh import Atlas, Charts
+from ...runtime.pack.growing.growth import apply_placement
+from ...runtime.pagesize import PageSize
 from ..graph.metadata import PlacedCharts
 from .torchfile import export_onnx
 from .torchmodel import frozen_copy
@@ -23,20 +25,21 @@ if TYPE_CHECKING:
     from torch import nn
 
     from ...runtime.mesh import Frame, Surface
+    from ...runtime.pagesize import Size
     from ..graph.metadata import Provenance
 
 MARGIN = 0.01
 """Free space around a chart's box, as a share of its cell."""
 
 
-def raw_onnx(model: nn.Module, surface: Surface, frame: Frame, size: int, facts: Provenance) -> bytes:
+def raw_onnx(model: nn.Module, surface: Surface, frame: Frame, size: Size, facts: Provenance) -> bytes:
     """The ONNX file's bytes.
 
     Args:
         model: unit ball (n, 3) → logits (n, p), uv (n, p, 2).
         surface: in source units; its vertices say how far each chart's uv reach.
         frame: source units → unit ball.
-        size: texels, for the metadata.
+        size: of the page.
         facts: for the metadata.
 
     Raises: ParityError when the exported network and torch disagree.
@@ -61,22 +64,24 @@ def raw_charts(model: nn.Module, surface: Surface, frame: Frame) -> Charts:
     return Charts(chart, uv[surface.faces, chart[:, None]], chart, np.arange(count), ("raw",) * count)
 
 
-def raw_atlas(surface: Surface, charts: Charts, size: int) -> Atlas:
-    """The charts' boxes in a square grid of cells, all at one scale; every face has corners of its own."""
+def raw_atlas(surface: Surface, charts: Charts, size: Size) -> Atlas:
+    """The charts' boxes in cells of a grid on the page, all at one scale; every face has corners of its own."""
     count = len(charts.patch_chart)
     cells = math.ceil(math.sqrt(count))
     low = np.zeros((count, 2))
-    extent = 0.0
+    widest = 0.0
     for k in range(count):
         corner = charts.corner_uv[charts.face_chart == k].reshape(-1, 2)
         if len(corner):
-            low[k], extent = corner.min(axis=0), max(extent, float(np.ptp(corner, axis=0).max()))
-    scale = (1.0 - 2.0 * MARGIN) / (cells * (extent or 1.0))
+            low[k], widest = corner.min(axis=0), max(widest, float(np.ptp(corner, axis=0).max()))
+    scale = (1.0 - 2.0 * MARGIN) / (cells * (widest or 1.0))
     origin = (np.stack([np.arange(count) % cells, np.arange(count) // cells], axis=1) + MARGIN) / cells
     placement = np.zeros((count, 2, 3))
     placement[:, 0, 0] = placement[:, 1, 1] = scale
     placement[:, :, 2] = origin - scale * low
-    placed = charts.corner_uv * scale + placement[charts.face_chart, None, :, 2]
+    extent = PageSize.of(size).extent
+    placement *= (extent.min() / extent)[:, None]
+    placed = apply_placement(placement, charts.face_chart, charts.corner_uv)
     corners = 3 * len(surface.faces)
     return Atlas(
         positions=surface.triangles.reshape(-1, 3),

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import InputError, ShapeError
 from ..mesh import Frame, Surface
+from ..pagesize import PageSize
 from .distortion import TRIM, singular_values, symmetric_dirichlet
 from .gaps import smallest_chart_gap
 from .overlap import orientation_sign, overlap_area, overlapping_pairs
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
+
+    from ..pagesize import Size
 
 _NO_AREA = 1e-14
 _SAME_UV = 1e-6
@@ -51,9 +54,9 @@ class Metrics:
     charts: number of charts.
     seam_length: length of interior surface edges whose uv differ / √(surface area).
     seam_edges: their number.
-    packing_efficiency: uv triangle area, overlaps counted once, over the area of the square `packing_square`.
+    packing_efficiency: uv triangle area, overlaps counted once, over the area of the square of uv `packing_square`.
     packing_square: "unit" where all uv lie in [0, 1]², otherwise "bounding": the square of the larger uv extent.
-    texel_density_min, _mean, _max: texels per source unit of a face, √(uv area / area) · size; area-weighted mean.
+    texel_density_min, _mean, _max: texels per source unit of a face, √(texels / area); area-weighted mean.
         None without size.
     chart_gap_texels: smallest distance between two charts' outlines, to a texel and mostly exact.  None without size
         or with a single chart.
@@ -92,16 +95,16 @@ def measure(
     corner_uv: NDArray[np.float64],
     face_chart: NDArray[np.int64] | None = None,
     *,
-    size: int | None = None,
+    size: Size | None = None,
     stack: NDArray[np.int64] | None = None,
 ) -> Metrics:
     """All metrics of one uv layout.
 
     Args:
         surface: welded surface, f faces.
-        corner_uv: (f, 3, 2) float64, finite, any units (atlas coordinates where size is given).
+        corner_uv: (f, 3, 2) float64, finite, any units (uv of a page where size is given, whose form then counts).
         face_chart: (f,) int64 labels; None takes the charts that `uv_charts` finds.
-        size: texels per uv unit, for texel densities and bleeding.
+        size: texels of the page, for texel densities and bleeding.
         stack: (f,) int64, the chart beneath each face where charts were laid on others on purpose: overlap, gap and
             packing efficiency are those of the lowest charts, whose faces name their own; None where all are.
 
@@ -110,21 +113,23 @@ def measure(
         InputError: a uv is not finite, or the layout or the surface has no area.
     """
     _check(surface, corner_uv, face_chart)
+    page = None if size is None else PageSize.of(size)
+    even_uv, texels = (corner_uv, None) if page is None else (page.even(corner_uv), page.side)
     table = edge_table(surface.faces)
     found, seam = uv_charts(surface.faces, corner_uv, table)
     chart = found if face_chart is None else np.unique(face_chart, return_inverse=True)[1].reshape(-1)
-    triangles, scaled_uv, area = _normalized(surface, corner_uv)
+    triangles, scaled_uv, area = _normalized(surface, even_uv)
+    square, square_area = _square(corner_uv)
     lowest = np.flatnonzero(np.ones(len(chart), bool) if stack is None else stack == face_chart)
     pairs = lowest[overlapping_pairs(corner_uv[lowest])]
     shared = overlap_area(corner_uv, pairs)
-    square, square_area = _square(corner_uv)
     total_uv = float(np.abs(signed_areas(corner_uv[lowest])).sum())
     meets = bool(np.any(chart[pairs[:, 0]] != chart[pairs[:, 1]]))
-    gap = _gap_texels(corner_uv[lowest], chart[lowest], _outline(table, seam)[lowest], meets, size)
+    gap = _gap_texels(even_uv[lowest], chart[lowest], _outline(table, seam)[lowest], meets, texels)
     return Metrics(
         **_distortion_means(triangles, scaled_uv, area),
         **_orientation_counts(corner_uv, chart, area),
-        **_texel_density(surface, corner_uv, area, size),
+        **_texel_density(surface, even_uv, area, texels),
         overlap_fraction=shared / total_uv,
         charts=int(chart.max()) + 1,
         seam_length=_seam_length(surface, table.edges[seam]),

@@ -1,4 +1,4 @@
 """What a user may ask for: options of the commands and of the Python API, declared once.
 
-Public face: `unwrap.Outputs`, `unwrap.AtlasOptions`, `pack.PackOptions`, `keywords.from_keywords`.
+Public face: `unwrap.Outputs`, `atlas.AtlasOptions`, `pack.PackOptions`, `keywords.from_keywords`.
 """

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from .unwrap import FORMATS, MOST_PAGES, AtlasOptions, MapOptions, Outputs, Seeded
+from .atlas import AtlasOptions, Seeded
+from .unwrap import FORMATS, MOST_PAGES, MapOptions, Outputs
 from .words import Flag, Names, demand
 
 if TYPE_CHECKING:

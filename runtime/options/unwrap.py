@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from .atlas import AtlasOptions, Seeded, SourceOptions
 from .seams import AUTO as AUTO
 from .seams import SeamOptions
 from .words import Flag, Names, demand, demand_known
@@ -21,7 +22,6 @@ from .words import Flag, Names, demand, demand_known
 if TYPE_CHECKING:
     from ..mesh import Asset
 
-SIZES = (16, 16384)
 PRESETS = ("fast", "paper")
 MODES = ("multi-chart", "global")
 PRECISIONS = ("float32", "bfloat16")
@@ -29,13 +29,10 @@ ABLATIONS = ("no-triangle", "no-differential", "no-upper", "no-lower", "bidirect
 """The paper's ablations: parts left out of the global mode, then parts added to the multi-chart mode."""
 FORMATS = ("glb", "gltf", "obj", "ply", "usda", "npz")
 SHARINGS = ("scene", "mesh", "material")
-ROTATIONS = ("off", "90", "any")
-STACKS = ("off", "identical", "mirrored")
 SCENES = ("glb", "gltf")
 """Formats that hold scenes."""
 POLYGONS = ("obj", "ply", "usda")
 """Formats that hold polygons of more than three corners."""
-LARGEST_SEED = 2**32 - 1
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
 FAST_ALONE = ("seam_price", "max_stretch", "hard_edges", "keep_seams", "keep_islands", "cut", "seams", "protect")
@@ -49,33 +46,6 @@ LAST_SET = 7
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 PAPER = Parameter(group="Options of preset paper")
 """Heading in the help."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Seeded:
-    """Everything random follows from one number."""
-
-    seed: int = 0
-    """The start of all random numbers: the same seed on the same machine gives the same bytes."""
-
-    def __post_init__(self) -> None:
-        found = f"seed is {self.seed}, expected 0 to {LARGEST_SEED}"
-        demand(0 <= self.seed <= LARGEST_SEED, f"{found}; pass for instance --seed 0")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SourceOptions:
-    """What is read of a file."""
-
-    select: Names = ()
-    """Nodes and meshes of a glTF scene to work on, by name; all else comes back as it is.  By default all of it."""
-    crease_angle: float = 30.0
-    """Degrees between two faces, 0 to 180, above which the edge between them is sharp, where a file has no normals.
-    Facets of STL files and smoothing groups of OBJ files decide without it."""
-
-    def __post_init__(self) -> None:
-        found = f"crease-angle is {self.crease_angle}, expected 0 to 180 degrees"
-        demand(0.0 <= self.crease_angle <= 180.0, f"{found}; pass for instance --crease-angle 30")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,39 +114,6 @@ class TrainOptions(Seeded, PaperOptions, ChartOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AtlasOptions(SourceOptions):
-    """The atlas as an image."""
-
-    size: int = 2048
-    """Side of the square atlas and of its textures, 16 to 16384 texels."""
-    padding: int | None = None
-    """Texels that are kept free around each chart; by default what the target asks for, else size / 256, at least 2."""
-    texel_density: float | None = None
-    """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
-    rotation: Literal["off", "90", "any"] = "any"
-    """How charts may be turned: not at all, by quarter turns, or first upright and then by quarter turns."""
-    stack: Literal["off", "identical", "mirrored"] = "off"
-    """Charts of one shape to lay over each other, to share their texels: none, identical ones, or mirror images too."""
-    whole_texels: Flag = False
-    """Let the edges of rectangular charts lie between texels; they give up a part of a texel for it."""
-
-    def __post_init__(self) -> None:
-        SourceOptions.__post_init__(self)
-        demand_known("rotation", self.rotation, ROTATIONS)
-        demand_known("stack", self.stack, STACKS)
-        (low, high), most = SIZES, self.size // 8
-        demand(low <= self.size <= high, f"size is {self.size} texels, expected {low} to {high}; pass --size 2048")
-        dense = self.texel_density is None or self.texel_density > 0
-        demand(dense, f"texel-density is {self.texel_density}, expected above 0; pass for instance --texel-density 512")
-        demand(0 <= self.margin <= most, f"padding is {self.margin} texels, expected 0 to {most}; leave --padding out")
-
-    @property
-    def margin(self) -> int:
-        """The padding in force, in texels."""
-        return max(2, self.size // 256) if self.padding is None else self.padding
-
-
-@dataclass(frozen=True, kw_only=True)
 class Options(AtlasOptions, TrainOptions):
     """What decides an unwrap, together with the surface.
 
@@ -189,19 +126,27 @@ class Options(AtlasOptions, TrainOptions):
     pages: int = 1
     """Pages that the charts are shared out to, 1 to 1000, at one texel density: where one would be too coarse.  Each
     has a material, textures and an ONNX file of its own, in one glb or gltf file."""
+    udim: Flag = False
+    """Lay each page into a square of uv of its own, as UDIM tiles 1001, 1002, …, with textures STEM_MAP.1001.png and so
+    on, for obj, ply, usda or npz."""
 
     @property
     def several(self) -> bool:
         """Whether there may be more than one atlas."""
-        return self.atlas != SHARINGS[0] or self.pages > 1
+        return self.atlas != SHARINGS[0] or self.paged
+
+    @property
+    def paged(self) -> bool:
+        """Whether charts are shared out to pages."""
+        return self.pages > 1 or self.udim
 
     def __post_init__(self) -> None:
         TrainOptions.__post_init__(self)
         AtlasOptions.__post_init__(self)
         found = f"pages is {self.pages}, expected 1 to {MOST_PAGES}"
         demand(1 <= self.pages <= MOST_PAGES, f"{found}; pass for instance --pages 4")
-        plain = self.pages == 1 or (self.preset == "fast" and self.atlas == SHARINGS[0] and self.stack == "off")
-        demand(plain, f"{self.pages} pages with atlas, stack or preset paper, expected one of them; leave one out")
+        plain = not self.paged or (self.preset == "fast" and self.atlas == SHARINGS[0] and self.stack == "off")
+        demand(plain, "pages or udim with atlas, stack or preset paper, expected one of them; leave one out")
         demand_known("atlas", self.atlas, SHARINGS)
         single = self.atlas == SHARINGS[0] or self.preset == "fast"
         demand(single, f"atlas is {self.atlas} with preset paper, expected scene; leave --atlas out")
@@ -311,6 +256,17 @@ class Outputs(FileOptions, MapOptions):
         demand(fits, f"several atlases with format {found}, expected glb or gltf; pass --format glb")
         demand(not self.layers, "several atlases with layers, expected one of the two; leave the other out")
         demand(not self.report, "several atlases with report, expected one of the two; leave the other out")
+
+    def for_tiles(self) -> None:
+        """Raises: InputError for what a mesh over UDIM tiles can't be written as."""
+        found = ", ".join(sorted(set(self.formats) & set(SCENES)))
+        demand(
+            not found,
+            f"format {found} with udim, which glTF does not know, expected obj, ply, usda or npz; pass for instance "
+            "--format obj, or leave --udim out",
+        )
+        plain = not (self.layers or self.report) and self.target is None
+        demand(plain, "udim with layers, a target or report, expected none of them; leave them out")
 
     def for_points(self) -> "Outputs":
         """The same without the triangles as ply or npz, whose names the points have; glb where that leaves none."""

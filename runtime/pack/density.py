@@ -15,10 +15,11 @@ from .config import PackConfig
 from .exact.lattice import STEPS
 from .growing.outlines import chart_outlines, outline_edges
 from .layouts.texels import aligned
-from .packing import Fitted, Packed, as_atlas, on_lattice, pack
+from .packing import Fitted, Packed, as_atlas, in_uv, on_lattice, pack
 
 if TYPE_CHECKING:
     from ..mesh import Asset, Charts
+    from ..pagesize import PageSize
     from .square import Square
 
 
@@ -35,20 +36,20 @@ def pack_square(
     """
     config = config or PackConfig()
     loose = config if square.texel_density is None else replace(config, whole_texels=False)
-    packed = pack(asset, charts, size=square.size, padding=square.padding, seed=seed, config=loose)
+    packed = pack(asset, charts, size=square.page, padding=square.padding, seed=seed, config=loose)
     if square.texel_density is None:
         return packed
-    most = packed.report["chart_scale"] * square.size
+    most = packed.report["chart_scale"] * square.page.side
     wanted = square.texel_density
     if wanted > (1.0 + ALIKE) * most:
-        size = 2 ** math.ceil(math.log2(square.size * wanted / most))
+        size = square.page.times(2 ** math.ceil(math.log2(wanted / most))).stored
         raise InputError(
             f"texel-density is {wanted:g}, expected at most {most:.4g} in {square.size} texels; pass --size {size} or "
             "a lower density"
         )
     wanted = min(wanted, most)
     found = _filled_part(asset, charts, square._replace(texel_density=wanted), packed, seed, loose)
-    return _shrunk(asset, charts, square, found, wanted / (found.report["chart_scale"] * square.size), config)
+    return _shrunk(asset, charts, square, found, wanted / (found.report["chart_scale"] * square.page.side), config)
 
 
 def _filled_part(asset: Asset, charts: Charts, square: Square, whole: Packed, seed: int, config: PackConfig) -> Packed:
@@ -56,8 +57,8 @@ def _filled_part(asset: Asset, charts: Charts, square: Square, whole: Packed, se
 
     whole: them in the whole atlas.  They have a texel more of padding, which shrinking to that very density may take.
     """
-    wanted, low, high, best = square.texel_density or 0.0, 0.0, float(square.size), whole
-    dense = {0.0: 0.0, high: whole.report["chart_scale"] * square.size}
+    wanted, low, high, best = square.texel_density or 0.0, 0.0, float(square.page.side), whole
+    dense = {0.0: 0.0, high: whole.report["chart_scale"] * square.page.side}
     for _ in range(config.density.tries):
         if best is not whole and wanted * (square.padding + 1) >= dense[high] * square.padding:
             break
@@ -65,28 +66,32 @@ def _filled_part(asset: Asset, charts: Charts, square: Square, whole: Packed, se
         side = float(round(low + min(max(share, 0.1), 0.9) * (high - low)))
         if not low < side < high:
             break
-        found = _reached(asset, charts, side, square.padding + 1, seed, config)
+        smaller = square.page.times(side / square.page.side)
+        found = _reached(asset, charts, smaller, square.padding + 1, seed, config)
         dense[side] = 0.0 if found is None else found.report["chart_scale"] * side
         low, high, best = (side, high, best) if found is None or dense[side] < wanted else (low, side, found)
     return best
 
 
-def _reached(asset: Asset, charts: Charts, side: float, padding: int, seed: int, config: PackConfig) -> Packed | None:
-    """The charts in an atlas of that side, None where the padding leaves no room for them."""
+def _reached(
+    asset: Asset, charts: Charts, page: PageSize, padding: int, seed: int, config: PackConfig
+) -> Packed | None:
+    """The charts in an atlas of that size, None where the padding leaves no room for them."""
     try:
-        return pack(asset, charts, size=int(side), padding=padding, seed=seed, config=config)
+        return pack(asset, charts, size=page, padding=padding, seed=seed, config=config)
     except InputError:
         return None
 
 
 def _shrunk(asset: Asset, charts: Charts, square: Square, found: Packed, factor: float, config: PackConfig) -> Packed:
-    """The charts of an atlas as a part of another: uv × factor, which is at most 1."""
+    """The charts of an atlas as a part of another: lengths on its page × factor, which is at most 1."""
     assert found.atlas.placement is not None
-    edges = outline_edges(asset.surface.faces, charts)
-    placement = aligned(found.atlas.placement * factor, chart_outlines(charts, edges), square.size, config)
-    faces, snapped = on_lattice(asset.surface.faces, charts, edges, placement, config)
-    fitted = Fitted(placement, found.report["skipped_growth_steps"], snapped, faces, 0.0)
-    atlas = as_atlas(asset, charts, fitted, square.size, square.padding)
+    page, edges = square.page, outline_edges(asset.surface.faces, charts)
+    placement = found.atlas.placement * found.atlas.page.extent[:, None] * factor
+    placed = aligned(in_uv(placement, page), chart_outlines(charts, edges), page, config)
+    faces, snapped = on_lattice(asset.surface.faces, charts, edges, placed, config)
+    fitted = Fitted(placement, placed, found.report["skipped_growth_steps"], snapped, faces, 0.0)
+    atlas = as_atlas(asset, charts, fitted, page, square.padding)
     report = {**found.report, "settings": asdict(config), "invalid_charts": snapped.invalid.tolist()}
     report["chart_scale"] = found.report["chart_scale"] * factor
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}

@@ -1,8 +1,8 @@
 """Packing: charts → Atlas, at an exact size, with padding kept and every chart at the same texel density.
 
-k charts · S texels per side · P padding in texels.  Chart coordinates are source units, v up.  A chart is turned to its
-smallest bounding rectangle, then by quarter turns, and moved; never mirrored, never stretched.  Outlines of two charts
-stay 2·P apart, and P from the border of the atlas.
+k charts · P padding in texels.  Chart coordinates are source units, v up.  A chart is turned to its smallest bounding
+rectangle, then by quarter turns, and moved; never mirrored, never stretched.  Outlines of two charts stay 2·P apart,
+and P from the border of the page.  Until the lattice, lengths are in sides of the page: its longer side is 1.
 
 Charts are dropped on a skyline (`skyline`, `placement`), grow where they lie until they jam (`growth`), keep the
 padding exactly (`padding`), and go to a lattice on which the exact tests are made (`lattice`): what was proven is what
@@ -22,6 +22,7 @@ from ..errors import FinishError, InputError
 from ..geometry.metrics import uv_charts
 from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
+from ..pagesize import PageSize
 from .config import PackConfig
 from .exact.lattice import STEPS, Snapped, snap
 from .exact.seamvertices import atlas_normals, split_vertices
@@ -34,6 +35,8 @@ from .layouts.texels import aligned
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..pagesize import Size
+
 
 @dataclass(frozen=True, eq=False)
 class Packed:
@@ -42,8 +45,8 @@ class Packed:
     atlas: complete, whatever `invalid` says.
     invalid: (i,) int64 charts in which triangles overlap, or lie upside down, on the numbers written: to be cut anew.
     report: settings, and what happened; ready for JSON.  longest_chart: its number; longest_chart_share: its length
-        over the side before charts grow; length_limits: no square of the charts' area can hold it, so it decides the
-        scale of all: cutting it would pay.  chart_scale: atlas units per source unit.  moved_vertices,
+        over the longer side before charts grow; length_limits: no square of the charts' area can hold it, so it decides
+        the scale of all: cutting it would pay.  chart_scale: sides of the page per source unit.  moved_vertices,
         moved_farthest: of slivers, atlas units.  skipped_growth_steps: linear programs without a solution.
     """
 
@@ -53,33 +56,40 @@ class Packed:
 
 
 def pack(
-    asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0, config: PackConfig | None = None
+    asset: Asset,
+    charts: Charts,
+    *,
+    size: Size | PageSize,
+    padding: int,
+    seed: int = 0,
+    config: PackConfig | None = None,
 ) -> Packed:
-    """Packs charts into one square atlas of exactly size × size texels.
+    """Packs charts onto one page of exactly that many texels.
 
     Args:
         asset: the mesh; its faces are those of the charts.
         charts: k charts, each id in [0, k) with a face.
-        size: texels per side, ≥ 1.
+        size: of the page, each side ≥ 1 texel.
         padding: texels kept free around each chart and along the border, ≥ 0.
         seed: of the search for a good layout; same seed, same bytes.
         config: numbers of placing and growing; None takes the defaults.
 
     Returns:
-        The atlas: uv are multiples of 2⁻²⁴, so float32 holds them and 1 − v; ``placement`` holds the similarity of each
-        chart, of the same scale for all.  And which charts are not valid there.
+        The atlas: uv are multiples of 2⁻²⁴, so float32 holds them and 1 − v; ``placement`` holds where each chart
+        went: on the page similarities, of the same scale for all.  And which charts are not valid there.
 
     Raises:
         InputError: size or padding is out of range, or the padding leaves no room for the charts.
         FinishError: a chart has no outline or no finite uv.
     """
     config = config or PackConfig()
-    _check(asset, charts, size, padding)
+    page = PageSize.of(size)
+    _check(asset, charts, page, padding)
     edges = outline_edges(asset.surface.faces, charts)
-    places, report = _placed(charts, chart_outlines(charts, edges), size, padding, config, seed)
-    jammed = [_grown(charts, edges, _Place(first, size, padding), config, 2.0) for first in places]
+    places, report = _placed(charts, chart_outlines(charts, edges), page, padding, config, seed)
+    jammed = [_grown(charts, edges, _Place(first, page, padding), config, 2.0) for first in places]
     best = max(range(len(jammed)), key=lambda number: scale_of(jammed[number][0]))
-    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(places[best], size, padding), config)
+    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(places[best], page, padding), config)
     fitted = fit(2.0, jammed[best])
     for _ in range(config.lattice.retries):
         if fitted.snapped.farthest <= fitted.slack:
@@ -87,11 +97,11 @@ def pack(
         fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
     scale = scale_of(fitted.placement)
     if config.whole_texels:
-        placement = aligned(fitted.placement, chart_outlines(charts, edges), size, config)
+        placement = aligned(in_uv(fitted.placement, page), chart_outlines(charts, edges), page, config)
         faces, snapped = on_lattice(asset.surface.faces, charts, edges, placement, config)
-        fitted = fitted._replace(placement=placement, faces=faces, snapped=snapped)
+        fitted = fitted._replace(uv_placement=placement, faces=faces, snapped=snapped)
     snapped = fitted.snapped
-    atlas = as_atlas(asset, charts, fitted, size, padding)
+    atlas = as_atlas(asset, charts, fitted, page, padding)
     report |= {
         "chart_scale": scale,
         "skipped_growth_steps": fitted.skipped,
@@ -102,26 +112,26 @@ def pack(
 
 
 def _placed(
-    charts: Charts, outlines: list[NDArray[np.float64]], size: int, padding: int, config: PackConfig, seed: int
+    charts: Charts, outlines: list[NDArray[np.float64]], page: PageSize, padding: int, config: PackConfig, seed: int
 ) -> tuple[list[NDArray[np.float64]], dict[str, Any]]:
     """First placements (k, 2, 3) of the charts, of which the better is to be found, and what limits them."""
     angles = np.zeros(len(outlines))
     if config.rotation == "any":
-        angles = np.array([upright_angle(outline, square=len(outlines) == 1) for outline in outlines])
+        angles = np.array([upright_angle(outline, page.extent if len(outlines) == 1 else None) for outline in outlines])
     upright = [outline @ rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
     area = float(np.abs(signed_areas(charts.corner_uv)).sum())
     # a hair more than the padding: charts that touch could not be parted by letting them shrink
-    room = padding / size + 4.0 / STEPS
+    room, extent = padding / page.side + 4.0 / STEPS, page.extent
     turns, rngs = config.rotation, [np.random.default_rng(seed) for _ in range(2)]
-    layout = find_layout(upright, area, room, config.place, rngs[0], rotation=turns)
-    nested = find_nested(upright, _folded(charts), area, room, config.nest, rngs[1], rotation=turns)
+    layout = find_layout(upright, area, room, config.place, rngs[0], rotation=turns, extent=extent)
+    nested = find_nested(upright, _folded(charts), area, room, config.nest, rngs[1], rotation=turns, extent=extent)
     layouts = [layout] if nested is None else [layout, nested]
-    extent = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
-    longest = int(extent.argmax())
+    length = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
+    longest = int(length.argmax())
     limits = {
         "longest_chart": longest,
-        "longest_chart_share": float(extent[longest] * layout.scale),
-        "length_limits": bool(extent[longest] > config.place.long * math.sqrt(area)),
+        "longest_chart_share": float(length[longest] * layout.scale),
+        "length_limits": bool(length[longest] > config.place.long * math.sqrt(area)),
     }
     return [_placement(found, angles) for found in layouts], limits
 
@@ -140,11 +150,16 @@ def _folded(charts: Charts) -> NDArray[np.bool_]:
 
 
 def scale_of(placement: NDArray[np.float64]) -> float:
-    """Atlas units per source unit of a placement (k, 2, 3)."""
+    """Sides of the page per source unit of a placement (k, 2, 3)."""
     return float(np.sqrt(np.linalg.det(placement[0, :, :2])))
 
 
-def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, size: int, padding: int) -> Atlas:
+def in_uv(placement: NDArray[np.float64], page: PageSize) -> NDArray[np.float64]:
+    """A placement (k, 2, 3) in sides of the page as one in uv; the very array on a square page."""
+    return placement if page.is_square else placement / page.extent[:, None]
+
+
+def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, page: PageSize, padding: int) -> Atlas:
     """The mesh with vertices doubled along seams, and the lattice points as their uv."""
     faces, source_vertex, _ = split_vertices(asset.faces, charts.face_chart, charts.corner_uv)
     uv = np.zeros((len(source_vertex), 2), dtype=np.float32)
@@ -156,9 +171,9 @@ def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, size: int, padding: i
         normals=atlas_normals(asset, source_vertex),
         face_chart=charts.face_chart,
         source_vertex=source_vertex,
-        size=size,
+        size=page.stored,
         padding=padding,
-        placement=fitted.placement,
+        placement=fitted.uv_placement,
     )
 
 
@@ -177,17 +192,21 @@ def atlas_of_corners(asset: Asset, face_chart: NDArray[np.int64], corner_uv: NDA
 
 
 class _Place(NamedTuple):
-    """A first placement (k, 2, 3) in an atlas of so many texels, with so many of padding."""
+    """A first placement (k, 2, 3) on a page, with so many texels of padding."""
 
     placement: NDArray[np.float64]
-    size: int
+    page: PageSize
     padding: int
 
 
 class Fitted(NamedTuple):
-    """Charts that jammed, on the lattice: faces (f, 3) over its points, one for each place of a vertex in a chart."""
+    """Charts that jammed, on the lattice: faces (f, 3) over its points, one for each place of a vertex in a chart.
+
+    placement: (k, 2, 3) in sides of the page.  uv_placement: the same in uv, rectangles on whole texels.
+    """
 
     placement: NDArray[np.float64]
+    uv_placement: NDArray[np.float64]
     skipped: int
     snapped: Snapped
     faces: NDArray[np.int64]
@@ -201,7 +220,7 @@ Grown: TypeAlias = "tuple[NDArray[np.float64], int]"
 def _grown(charts: Charts, edges: NDArray[np.bool_], first: _Place, config: PackConfig, slack: float) -> Grown:
     """Charts grown from where they were placed; slack: what is kept free beyond the padding, lattice units."""
     outlines = chart_outlines(charts, edges)
-    return grown(first.placement, outlines, first.size, first.padding, config.growth, slack=slack / STEPS)
+    return grown(first.placement, outlines, first.page, first.padding, config.growth, slack=slack / STEPS)
 
 
 def fitted_charts(
@@ -218,8 +237,9 @@ def fitted_charts(
     slack: what is kept free beyond the padding, lattice units.  known: what they grow to with it.
     """
     placement, skipped = known or _grown(charts, edges, first, config, slack)
-    faces, snapped = on_lattice(mesh, charts, edges, placement, config)
-    return Fitted(placement, skipped, snapped, faces, slack)
+    placed = in_uv(placement, first.page)
+    faces, snapped = on_lattice(mesh, charts, edges, placed, config)
+    return Fitted(placement, placed, skipped, snapped, faces, slack)
 
 
 def on_lattice(
@@ -229,7 +249,7 @@ def on_lattice(
     placement: NDArray[np.float64],
     config: PackConfig,
 ) -> tuple[NDArray[np.int64], Snapped]:
-    """Charts of faces mesh (f, 3) where they are placed (k, 2, 3): faces over places of vertices, and these snapped."""
+    """Charts of faces mesh (f, 3) where they are placed in uv (k, 2, 3): faces, and their vertices snapped."""
     faces, _, flat = split_vertices(mesh, charts.face_chart, charts.corner_uv)
     chart = np.zeros(len(flat), dtype=np.int64)
     chart[faces] = charts.face_chart[:, None]
@@ -259,9 +279,9 @@ def atlas_from_uv(asset: Asset) -> Atlas:
     )
 
 
-def _check(asset: Asset, charts: Charts, size: int, padding: int) -> None:
-    if size < 1 or padding < 0:
-        raise InputError(f"size {size} and padding {padding}: expected size ≥ 1 and padding ≥ 0 texels")
+def _check(asset: Asset, charts: Charts, page: PageSize, padding: int) -> None:
+    if min(page) < 1 or padding < 0:
+        raise InputError(f"size {page.stored} and padding {padding}: expected size ≥ 1 and padding ≥ 0 texels")
     if charts.corner_uv.shape != (len(asset.faces), 3, 2) or charts.face_chart.shape != (len(asset.faces),):
         raise FinishError(
             f"charts cover {len(charts.face_chart)} faces, the mesh has {len(asset.faces)}; please report"

@@ -66,7 +66,7 @@ def pack_pages(
     for faces, first in zip((own for own in used if len(own)), found, strict=True):
         packed = first
         if scale < (1.0 - ALIKE) * first.report["chart_scale"]:
-            even = square._replace(texel_density=scale * square.size)
+            even = square._replace(texel_density=scale * square.page.side)
             packed = _packed(asset, charts, faces, even, seed, config)
         corner_uv[faces] = packed.atlas.uv[packed.atlas.faces]
         invalid.append(np.unique(charts.face_chart[faces])[packed.invalid])

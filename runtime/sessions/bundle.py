@@ -16,11 +16,14 @@ import numpy as np
 
 from ..errors import BundleError, InputError
 from ..mesh import Frame
+from ..pagesize import PageSize
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+    from ..pagesize import Size
 
 METADATA_KEY = "flexpara"
 FORMAT_VERSION = 1
@@ -36,6 +39,8 @@ Placement = tuple[tuple[tuple[float, float, float], tuple[float, float, float]],
 
 _MAX_CHARS = 64 * 1024 * 1024
 _MAX_COUNT = 1_000_000
+LARGEST = 1 << 20
+"""Texels of a side."""
 _REMEDY = "export the file again with this version of flexpara"
 
 
@@ -44,7 +49,8 @@ class BundleMetadata:
     """Everything known about an exported map besides its weights.
 
     chart_count, patch_count: k ≥ 1 and p ≥ 1.  frame: centre and scale, source units.
-    placement: k rows of (2, 3), chart coordinates → atlas uv.  patch_chart: p chart indices.  size, padding: texels.
+    placement: k rows of (2, 3), chart coordinates → atlas uv.  patch_chart: p chart indices.  size, padding: texels,
+    the size a number for a square, else "WIDTHxHEIGHT".
     source_sha256: hex digest of the source file, "" when made in memory.  settings, metrics: JSON objects, as training
     reports them.  producer_name, producer_version: who wrote the file.
     """
@@ -54,7 +60,7 @@ class BundleMetadata:
     frame: Frame
     placement: Placement
     patch_chart: tuple[int, ...]
-    size: int
+    size: Size
     padding: int
     source_sha256: str
     settings: Mapping[str, Any]
@@ -102,8 +108,8 @@ class BundleMetadata:
             frame=reader.frame(),
             placement=reader.placement(charts),
             patch_chart=reader.patch_chart(patches, charts),
-            size=reader.integer(reader.content, "size", 1, 1 << 20),
-            padding=reader.integer(reader.content, "padding", 0, 1 << 20),
+            size=reader.size(),
+            padding=reader.integer(reader.content, "padding", 0, LARGEST),
             source_sha256=reader.text(reader.content, "source_sha256"),
             settings=reader.mapping("settings"),
             metrics=reader.mapping("metrics"),
@@ -146,6 +152,17 @@ class _Reader:
         if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
             self.fail(key, value, f"an integer in [{low}, {high}]")
         return value
+
+    def size(self) -> Size:
+        """Of the atlas: texels of a square's side, or WIDTHxHEIGHT."""
+        value = self.content.get("size")
+        try:
+            page = PageSize.of(self.integer(self.content, "size", 1, LARGEST) if not isinstance(value, str) else value)
+        except InputError:
+            page = PageSize(0, 0)
+        if min(page) < 1 or page.side > LARGEST:
+            self.fail("size", value, f"1 to {LARGEST} texels, or WIDTHxHEIGHT")
+        return page.stored
 
     def text(self, content: Mapping[str, Any], key: str) -> str:
         value = content.get(key)

@@ -91,6 +91,13 @@ def two_charts() -> Pair:
     return replace(atlas, face_chart=np.array([0, 0, 1, 1])), asset
 
 
+@pytest.fixture
+def closed() -> Pair:
+    """A tetrahedron, whose uv overlap."""
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    return make_pair([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces, [[0, 0], [1, 0], [0, 1], [1, 1]])
+
+
 def make_sphere(rows: int, columns: int) -> Pair:
     """Unit sphere by longitude and latitude, without its poles, cut along a meridian; uv leave a rim of 0.05."""
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0.05, 0.95, rows + 1))

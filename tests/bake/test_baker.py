@@ -19,7 +19,8 @@ from flexpara.bake.files.textures import texture_names, write_textures
 from flexpara.bake.maps.catalogue import find_map
 from flexpara.bake.raster.context import open_context
 from flexpara.bake.raster.gbuffer import GBuffer
-from flexpara.bake.raster.plan import SoftwareWarning
+from flexpara.bake.raster.plan import Device, SoftwareWarning
+from flexpara.bake.seams.seamcheck import seam_report
 from flexpara.bake.settings import BakeSettings
 from flexpara.runtime.errors import InputError, MissingDependencyError
 from flexpara.runtime.mesh import Asset, Atlas
@@ -54,6 +55,23 @@ def test_position_of_the_unit_quad_is_exact_to_1e_5(quad: Pair) -> None:
     place = (np.arange(size) + 0.5) / size
     assert np.abs(position[..., 0] - place).max() < 1e-5
     assert np.abs(position[..., 1] - (1 - place)[:, None]).max() < 1e-5
+
+
+@pytest.mark.parametrize("device", ["auto", "software"])
+def test_each_side_of_an_image_has_texels_of_its_own(sphere: Pair, quad: Pair, device: Device) -> None:
+    position = bake(*quad, ["position"], size="48x20", device=device)["position"].pixels
+    assert position.shape == (20, 48, 3)
+    assert np.abs(position[..., 0] - (np.arange(48) + 0.5) / 48).max() < 1e-5
+    assert np.abs(position[..., 1] - (1 - (np.arange(20) + 0.5) / 20)[:, None]).max() < 1e-5
+    whole, cut = (bake(*sphere, ["normal", "ao"], size="64x96", limit=limit, device=device) for limit in (None, 37))
+    for name, texture in whole.items():
+        assert texture.pixels.shape[:2] == (96, 64)
+        np.testing.assert_array_equal(texture.pixels, cut[name].pixels)
+
+
+def test_seams_are_closed_in_an_image_that_is_not_square(sphere: Pair) -> None:
+    textures = bake(*sphere, ["position"], size="96x256")
+    assert seam_report(sphere[0], textures)["position"]["max"] < 1.5 / 255.0
 
 
 def test_no_maps_need_no_context(quad: Pair, monkeypatch: pytest.MonkeyPatch) -> None:

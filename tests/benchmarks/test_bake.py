@@ -14,6 +14,7 @@ from flexpara.bake.maps.rays import RayScene
 from flexpara.bake.raster.gbuffer import GBuffer
 from flexpara.bake.raster.layout import Planes
 from flexpara.runtime.mesh import Frame, Surface
+from flexpara.runtime.pagesize import PageSize
 
 
 def test_images_are_looked_up_between_texel_centres() -> None:
@@ -51,10 +52,10 @@ def test_a_camera_sees_the_triangle_it_looks_at(side: float) -> None:
 
 
 def test_a_band_names_the_texels_of_the_whole_image() -> None:
-    whole = GBuffer.of(Planes.of(8, 8), size=8)
+    whole = GBuffer.of(Planes.of(8, 8), size=PageSize(8, 8))
     band = bake.band_of(whole, 2, 5)
     assert band.shape == (3, 8)
-    assert band.side == 8
+    assert band.page == (8, 8)
     assert band.image_texels(np.array([0, 9])).tolist() == [16, 25]
 
 

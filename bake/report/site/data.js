@@ -1,5 +1,5 @@
 // The results of the page, unpacked: typed arrays, one vertex for each corner of a face, and facts of faces.
-// f faces.  Positions lie in the unit ball, uv have v up.
+// f faces.  Positions lie in the unit ball; uv have v up and are in sides of the page, whose longer one is 1.
 import * as THREE from "three";
 
 const TYPES = {

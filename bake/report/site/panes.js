@@ -46,11 +46,11 @@ export class Orbit {
   }
 }
 
-/** From above the square of the layout, moved and come closer. */
+/** From above the page of the layout, moved and come closer. */
 export class Sheet {
-  constructor() { this.reset(); }
+  constructor(extent) { this.extent = extent; this.reset(); }
 
-  reset() { Object.assign(this, { x: 0.5, y: 0.5, half: 0.54 }); }
+  reset() { Object.assign(this, { x: 0.5 * this.extent[0], y: 0.5 * this.extent[1], half: 0.54 }); }
 
   camera() {
     const { x, y, half } = this;

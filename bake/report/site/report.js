@@ -51,7 +51,7 @@ class Page {
       box.className = "result";
       title.textContent = result.title;
       const model = new Pane(result, false, this.orbit, `Model of ${result.title}`);
-      const layout = new Pane(result, true, new Sheet(), `uv layout of ${result.title}`);
+      const layout = new Pane(result, true, new Sheet(result.extent), `uv layout of ${result.title}`);
       box.append(title, model.canvas, layout.canvas);
       by("panes").append(box);
       this.panes.push(model, layout);

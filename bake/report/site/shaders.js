@@ -5,7 +5,8 @@ import * as THREE from "three";
 export const LOOKS = { checker: 0, picture: 1, charts: 2, distortion: 3, plain: 4 };
 
 const VERTEX = /* glsl */ `
-uniform bool flattened;
+uniform bool flattened, backdrop;
+uniform vec2 extent;
 flat out int face;
 out vec3 weights;
 out vec2 place;
@@ -15,8 +16,8 @@ void main() {
   face = gl_VertexID / 3;
   int corner = gl_VertexID - 3 * face;
   weights = vec3(corner == 0, corner == 1, corner == 2);
-  place = uv;
-  vec4 view = modelViewMatrix * vec4(flattened ? vec3(uv, 0.0) : position, 1.0);
+  place = backdrop ? uv * extent : uv;
+  vec4 view = modelViewMatrix * vec4(flattened ? vec3(place, 0.0) : position, 1.0);
   seen = view.xyz;
   smoothNormal = normalMatrix * normal;
   gl_Position = projectionMatrix * view;
@@ -28,6 +29,7 @@ precision highp int;
 uniform sampler2D chartColors, heatColors, picture;
 uniform int look, chosenFace, marks;
 uniform float cells, level;
+uniform vec2 extent;
 uniform bool flattened, numbered, edges, backdrop;
 flat in int face;
 in vec3 weights;
@@ -51,6 +53,7 @@ vec3 checker(vec2 spot) {
 }
 
 vec3 fromPicture(vec2 spot) {
+  spot /= extent;
   if (level < 0.5) return texture(picture, spot).rgb;
   vec2 size = vec2(textureSize(picture, int(level)));
   return textureLod(picture, (floor(spot * size) + 0.5) / size, level).rgb;
@@ -105,7 +108,7 @@ void main() {
 /** The material of one result; uniforms are set before each drawing. */
 export function surfaceMaterial(result) {
   const values = {
-    chartColors: result.chartColors, heatColors: result.heatColors, picture: null, look: 0, chosenFace: -1,
+    chartColors: result.chartColors, heatColors: result.heatColors, picture: null, look: 0, chosenFace: -1, extent: new THREE.Vector2(...result.extent),
     marks: 0, cells: 32, level: 0, flattened: false, numbered: false, edges: false, backdrop: false,
   };
   return new THREE.ShaderMaterial({

@@ -109,6 +109,6 @@ function setUniforms(uniforms, result, settings, chosen) {
 
 /** How many levels a picture of the page is below the texture it was made of. */
 function mipsLeftOut(result, picture) {
-  const side = picture.image?.width ?? 1;
+  const side = Math.max(picture.image?.width ?? 1, picture.image?.height ?? 1);
   return result.size && !picture.isCard ? Math.max(0, Math.log2(result.size / side)) : 0;
 }

@@ -33,6 +33,14 @@ if TYPE_CHECKING:
 
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
 REMEDY = "pip install 'flexpara[formats]', or convert the file"
+CONVERTED = {
+    "fbx": "FBX, a format without a public description, is not read; import it in Blender and export glTF (.glb)",
+    "blend": "Blender's own files are not read; export glTF (.glb) there, or use flexpara's add-on",
+    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD is written, not read; import it in Blender and export .glb"),
+    **dict.fromkeys(("iges", "igs"), "CAD surfaces hold no triangles; tessellate them to .glb, .obj or .stl"),
+    **dict.fromkeys(("max", "ma", "mb", "c4d", "skp", "3ds"), "is a format of one program; export .glb or .obj there"),
+}
+"""Formats that people bring and that are not read, with the way out."""
 MADE_UP_GREY = [102, 102, 102, 255]
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # its log would end on stderr
 ARCHIVES = frozenset({"3mf", "3dxml", "zae"})
@@ -46,6 +54,8 @@ def read_with_trimesh(data: bytes, path: Path) -> RawMesh:
         MissingDependencyError: trimesh reads this format with a package that is absent.
     """
     kind = path.suffix.lower().removeprefix(".")
+    if kind in CONVERTED:
+        raise MeshError(f".{kind}: {CONVERTED[kind]}")
     loader = mesh_loaders.get(kind)
     if loader is None or kind in NOT_MESHES:
         raise MeshError(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import MeshError, MissingDependencyError
 from ...material import SLOTS, UNTURNED, Material, Picture
 from ..pictures.ktx2 import decode_ktx2
-from ..pictures.pictures import decode_image
+from ..pictures.pictures import decode_image, is_deep
 from ..text import finite
 from .buffers import GltfFile, buffer_view, read_resource
 
@@ -30,19 +30,22 @@ STRENGTH = "KHR_materials_emissive_strength"
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
 ALPHA_MODES: tuple[AlphaMode, ...] = ("OPAQUE", "MASK", "BLEND")
-COUNTS = ("textures_not_decoded", "textures_of_other_uv")
+COUNTS = ("textures_not_decoded", "textures_of_other_uv", "textures_to_8_bits")
 
 
 def read_materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
     """All materials of the file, and what could not be kept.
 
-    Counted are textures whose picture can't be had, and textures on another uv set than the material's first one.
+    Counted are textures whose picture can't be had, textures on another uv set than the material's first one, and
+    pictures of 16 bits a channel.
     Raises: MeshError for a picture that is none; lookup and value errors where the tree is damaged.
     """
     changes: dict[str, int] = dict.fromkeys(COUNTS, 0)
     pictures: dict[int, NDArray[np.uint8]] = {}
     entries = enumerate(file.tree.get("materials", []))
-    return [_material(file, entry, index, pictures, changes) for index, entry in entries], changes
+    materials = [_material(file, entry, index, pictures, changes) for index, entry in entries]
+    changes["textures_to_8_bits"] = sum(is_deep(image_bytes(file, source)) for source in pictures)
+    return materials, changes
 
 
 def uv_set(material: dict[str, Any]) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import MeshError
 from ...material import Material, Picture, seen_through
-from ..pictures.pictures import decode_image
+from ..pictures.pictures import decode_image, is_deep
 from ..text import finite, lines_of, shown
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 SLOTS: dict[str, Slot] = {"map_kd": "base-color", "map_ke": "emissive", "norm": "normal"}
 
 
-def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[dict[str, Material], int]:
-    """OBJ material library → materials by name, and how many textures were not found.
+def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[dict[str, Material], dict[str, int]]:
+    """OBJ material library → materials by name, and changes: textures not found, or of 16 bits.
 
     Read are Kd, d, map_Kd, and of the physically based additions Pm, Pr, Ke, map_Ke and norm; of options -clamp on.
     Kd is a linear factor; beside a texture it is ignored, as exporters leave their default grey there.
@@ -39,25 +39,29 @@ def read_mtl(data: bytes, read_sibling: Callable[[str], bytes | None]) -> tuple[
             current[key.lower()] = rest.strip()
     materials: dict[str, Material] = {}
     known: dict[str, NDArray[np.uint8] | None] = {}  # many materials may name one picture
-    missing = 0
+    changes = {"missing_textures": 0, "textures_to_8_bits": 0}
     for name, fields in raw.items():
         pictures: dict[Slot, Picture] = {}
         for key, slot in SLOTS.items():
-            picture = _pixels(_map_name(fields[key]), read_sibling, known) if fields.get(key) else None
-            missing += bool(fields.get(key)) and picture is None
+            picture = _pixels(_map_name(fields[key]), read_sibling, known, changes) if fields.get(key) else None
+            changes["missing_textures"] += bool(fields.get(key)) and picture is None
             if picture is not None:
                 pictures[slot] = Picture(picture, _mtl_wrap(fields[key]))
         materials[name] = _mtl_material(name, fields, pictures)
-    return materials, missing
+    return materials, changes
 
 
 def _pixels(
-    name: str, read_sibling: Callable[[str], bytes | None], known: dict[str, NDArray[np.uint8] | None]
+    name: str,
+    read_sibling: Callable[[str], bytes | None],
+    known: dict[str, NDArray[np.uint8] | None],
+    changes: dict[str, int],
 ) -> NDArray[np.uint8] | None:
-    """A picture beside the file, decoded once; None where it is absent.  known grows."""
+    """A picture beside the file, decoded once; None where it is absent.  known and changes grow."""
     if name not in known:
         data = read_sibling(name)
         known[name] = None if data is None else decode_image(data, known.values())
+        changes["textures_to_8_bits"] += data is not None and is_deep(data)
     return known[name]
 
 

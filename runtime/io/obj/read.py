@@ -246,9 +246,9 @@ def _materials(
         found = read_sibling(name)
         changes["missing_materials"] = changes.get("missing_materials", 0) + (found is None)
         if found is not None:
-            library, missing = read_mtl(found, read_sibling)
+            library, counts = read_mtl(found, read_sibling)
             known.update(library)
-            changes["missing_textures"] = changes.get("missing_textures", 0) + missing
+            changes.update({kind: changes.get(kind, 0) + count for kind, count in counts.items()})
     names = ["default", *lines.text["usemtl"]]
     used = np.searchsorted(lines.number["usemtl"], at_line)
     distinct = list(dict.fromkeys(names[index] for index in dict.fromkeys(used.tolist())))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 """Kinds of pictures that are opened.  Pillow knows others, some of which start programs or are hardly used."""
+PNG = b"\x89PNG\r\n\x1a\n"
 BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
 BROKEN += (zlib.error, Image.DecompressionBombError, MemoryError)
 """What Pillow raises on damaged files: it has no family of its own."""
@@ -71,6 +72,11 @@ def decode_image(data: bytes, beside: Iterable[NDArray[np.uint8] | None] = ()) -
         raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
 
 
+def is_deep(data: bytes) -> bool:
+    """Whether a picture file is a PNG of 16 bits a channel, of which 8 are read."""
+    return data.startswith(PNG) and data[24:25] == b"\x10"
+
+
 def _opened(data: bytes) -> Image.Image:
     """A picture of which but the head is read.  Pillow's own limit on pixels stands aside: ours follows."""
     theirs, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
@@ -93,12 +99,15 @@ def demand_texels(width: int, height: int, beside: Iterable[NDArray[np.uint8] | 
 
 
 def picture_pixels(image: Image.Image) -> NDArray[np.uint8]:
-    """Opened picture → (h, w, 4) uint8 sRGB, row 0 = top.
+    """Opened picture → (h, w, 4) uint8 sRGB, row 0 = top; the upper 8 of 16 bits.
 
     Raises: MeshError where it is damaged or has more texels than are read.
     """
     demand_texels(image.width, image.height)
     try:
+        if image.mode.startswith("I"):  # grey of 16 bits, which Pillow would clip at 255
+            grey = np.clip(np.asarray(image).astype(np.int64) >> 8, 0, 255).astype(np.uint8)
+            image = Image.fromarray(grey)
         return np.asarray(image.convert("RGBA"), dtype=np.uint8)
     except BROKEN as error:
         raise MeshError("a texture is damaged, expected a whole PNG or JPEG; remove it or save it as PNG") from error

@@ -18,11 +18,12 @@ from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
 from ...mesh import Polygons
 from ..pictures.colors import as_rgba
-from ..pictures.pictures import decode_image
+from ..pictures.pictures import decode_image, is_deep
 from ..polygons import Triangles, strip_triangles, triangles_of
 from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body
 from .header import FACES, ply_header
+from .leftout import COLORS, left_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from .body import Table
     from .header import PlyHeader
 
-COLORS = ("red", "green", "blue", "alpha")
 HARMONIC = 0.5 / math.sqrt(math.pi)
 """Value of the constant spherical harmonic."""
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -66,6 +66,7 @@ def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         normals=_group(vertices, ("nx", "ny", "nz")),
         colors=colors,
         uv=uv,
+        changes=left_out(header),
     )
     if "tristrips" in tables:
         return replace(raw, faces=_strips(tables["tristrips"], len(positions)))
@@ -152,7 +153,7 @@ def _with_faces(raw: RawMesh, table: Table, header: PlyHeader, read_sibling: Cal
     if not isinstance(lists, Lists):
         raise MeshError(f"the PLY faces have {[*table]}, expected a list vertex_indices; check the export")
     found = triangles_of(raw.positions, lists.values.astype(np.int64), lists.size, "PLY")
-    changes = {"faces_under_three_corners": found.left_out}
+    changes = {**raw.changes, "faces_under_three_corners": found.left_out}
     materials, face_material = _materials(table, found.polygon, header, read_sibling, changes)
     part = replace(raw, faces=found.faces, materials=materials, face_material=face_material, changes=changes)
     part = replace(part, polygons=Polygons(found.corner, lists.size))
@@ -195,6 +196,7 @@ def _materials(
         data = None if name in known else read_sibling(name)
         if data is not None:
             known[name] = decode_image(data, known.values())
+            changes["textures_to_8_bits"] = changes.get("textures_to_8_bits", 0) + is_deep(data)
         picture = Picture(known[name]) if name in known else None
         changes["missing_textures"] = changes.get("missing_textures", 0) + (picture is None)
         materials.append(

@@ -14,8 +14,9 @@ import numpy as np
 
 from ...errors import InputError, MissingFileError, ShapeError
 from ..ply.header import FACES, MAX_HEADER, ply_header
+from ..ply.leftout import left_out
 from ..ply.read import read_ply_points
-from .cloud import PointCloud, check_uv, cloud_from_arrays
+from .cloud import PointCloud, check_uv, cloud_from_arrays, with_changes
 from .tables import MAX_BYTES, TEXT, read_table
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def load_cloud(path: Path) -> PointCloud:
         arrays = _read(data, kind)
         if len(arrays["points"]) > MAX_POINTS:
             raise InputError(f"{len(arrays['points'])} points, at most {MAX_POINTS} are read; thin them out")
-        return cloud_from_arrays(**arrays, stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
+        cloud = cloud_from_arrays(**arrays, stem=path.stem, sha256=hashlib.sha256(data).hexdigest())
+        return with_changes(cloud, **left_out(ply_header(data))) if kind == ".ply" else cloud
     except InputError as error:
         raise type(error)(f"{path}: {error}") from error
 

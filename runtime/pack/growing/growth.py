@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from ...pagesize import PageSize
     from ..config import GrowthConfig
 
 
@@ -39,7 +40,7 @@ def apply_placement(
 def grown(
     placement: NDArray[np.float64],
     outlines: list[NDArray[np.float64]],
-    size: int,
+    page: PageSize,
     padding: int,
     config: GrowthConfig,
     *,
@@ -48,12 +49,12 @@ def grown(
     """The placement (k, 2, 3) with charts shifted and grown as far as the padding allows; never turned or mirrored.
 
     Args:
-        placement: (k, 2, 3) float64, chart coordinates → atlas uv, with the padding kept.
+        placement: (k, 2, 3) float64, chart coordinates → sides of the page, with the padding kept.
         outlines: per chart its outline segments (s, 2, 2) float64 in chart coordinates.
-        size: texels per side.
+        page: texels.
         padding: texels.
         config: numbers.
-        slack: what is kept free around each chart beyond the padding, atlas units: rounding must not undercut it.
+        slack: what is kept free around each chart beyond the padding, sides of the page: rounding must not undercut it.
 
     Returns:
         The new placement, and how many of the linear programs had no solution (their step is left out).
@@ -66,10 +67,10 @@ def grown(
     parts = np.split(segments, np.cumsum([len(outline) for outline in outlines])[:-1])
     box = np.array([(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for part in parts])
     centre = box.mean(axis=1)
-    border, apart = padding / size + slack, 2.0 * (padding / size + slack)
-    fit = (1.0 - 2.0 * border) / float(np.ptp(box.reshape(-1, 2), axis=0).max())
+    border, apart = padding / page.side + slack, 2.0 * (padding / page.side + slack)
+    fit = float(((page.extent - 2.0 * border) / np.maximum(np.ptp(box.reshape(-1, 2), axis=0), 1e-300)).min())
     fitted = border + fit * (centre - box.reshape(-1, 2).min(axis=0))
-    crowd = Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit)
+    crowd = Crowd(segments - centre[chart][:, None], chart, box[:, 1] - centre, fitted, fit, page.extent)
     crowd, skipped = jammed(padded(crowd, border, apart, config), border, apart, config)
     linear, shift = placement[:, :, :2] * crowd.factor, (placement[:, :, 2] - centre) * crowd.factor + crowd.centre
     return np.concatenate([linear, shift[:, :, None]], axis=2), skipped
@@ -132,11 +133,12 @@ def _pair_rows(crowd: Crowd, pairs: NDArray[np.int64], apart: float) -> tuple[cs
 
 
 def _wall_rows(crowd: Crowd, border: float) -> tuple[csr_array, NDArray[np.float64]]:
-    """The same for the four sides of the square: 4·k rows."""
+    """The same for the four sides of the page: 4·k rows."""
     half, centre = crowd.half.reshape(-1), crowd.centre.reshape(-1)
     number, last = np.arange(len(half)), np.full(len(half), len(half))
     values = np.concatenate([np.ones(len(half)), -np.ones(len(half)), half, half])
     rows = np.concatenate([number, number + len(half), number, number + len(half)])
     columns = np.concatenate([number, number, last, last])
-    room = np.concatenate([1.0 - border - centre - crowd.factor * half, centre - border - crowd.factor * half])
+    far = np.tile(crowd.extent, len(crowd.centre))
+    room = np.concatenate([far - border - centre - crowd.factor * half, centre - border - crowd.factor * half])
     return coo_array((values, (rows, columns))).tocsr(), room

@@ -51,9 +51,10 @@ def rotation(angle: float) -> NDArray[np.float64]:
     return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
 
 
-def upright_angle(outline: NDArray[np.float64], *, square: bool) -> float:
-    """Angle (radians) that turns an outline (s, 2, 2) into its smallest bounding rectangle (or square, to a degree).
+def upright_angle(outline: NDArray[np.float64], extent: NDArray[np.float64] | None = None) -> float:
+    """Angle (radians) that turns an outline (s, 2, 2) into its smallest bounding rectangle.
 
+    extent: (2,) of a page that it shall fill alone, upright or lying: the angle, to a degree, at which it needs least.
     One side of that rectangle lies along an edge of the convex hull (Freeman and Shapira 1975).
     """
     points = outline.reshape(-1, 2)
@@ -63,12 +64,16 @@ def upright_angle(outline: NDArray[np.float64], *, square: bool) -> float:
         points = points[np.lexsort((points[:, 1], points[:, 0]))[[0, -1]]]
     edge = np.roll(points, -1, axis=0) - points
     angles = -np.arctan2(edge[:, 1], edge[:, 0])
-    if square:
+    if extent is not None:
         angles = np.concatenate([angles, np.deg2rad(np.arange(90.0))])
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     width = np.ptp(points[:, 0] * cosine - points[:, 1] * sine, axis=1)
     height = np.ptp(points[:, 0] * sine + points[:, 1] * cosine, axis=1)
-    return float(angles[np.argmin(np.maximum(width, height) if square else width * height)])
+    if extent is None:
+        return float(angles[np.argmin(width * height)])
+    wide, high = extent.tolist()
+    needed = np.minimum(np.maximum(width / wide, height / high), np.maximum(width / high, height / wide))
+    return float(angles[np.argmin(needed)])
 
 
 def is_rectangle(outline: NDArray[np.float64], accuracy: float = 1e-6) -> bool:

@@ -6,7 +6,7 @@ outlines themselves.  Whatever places charts, this comes last.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,28 +22,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Crowd:
-    """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2)."""
+    """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2).
+
+    extent: (2,) of the page, and all lengths, in sides of it.
+    """
 
     local: NDArray[np.float64]
     chart: NDArray[np.int64]
     half: NDArray[np.float64]
     centre: NDArray[np.float64]
     factor: float
+    extent: NDArray[np.float64] = field(default_factory=lambda: np.ones(2))
 
     def segments(self) -> NDArray[np.float64]:
-        """(s, 2, 2) where the segments lie, atlas units."""
+        """(s, 2, 2) where the segments lie."""
         return self.centre[self.chart][:, None] + self.factor * self.local
 
 
 def padded(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> Crowd:
     """The crowd with the largest factor that keeps all distances exactly, charts where they are.
 
-    border: from each side of the square, apart: between two charts; atlas units.
+    border: from each side of the page, apart: between two charts.
 
     Raises:
         FinishError: the repairs that the config allows did not suffice.
     """
-    room = np.minimum(crowd.centre, 1.0 - crowd.centre) - border
+    room = np.minimum(crowd.centre, crowd.extent - crowd.centre) - border
     walls = float((room / np.maximum(crowd.half, 1e-300)).min())
     spacing = max(config.sample / 2.0, apart / 2.0)
     pairs = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart + spacing)

@@ -130,10 +130,9 @@ class Nest:
     width: int
     height: int
 
-    @property
-    def side(self) -> int:
-        """Of the square that holds all."""
-        return max(self.width, self.height)
+    def side(self, extent: NDArray[np.float64]) -> float:
+        """The longer side of the page of that form that holds all, in cells.  extent: (2,) of it, sides of the page."""
+        return max(self.width / extent[0], self.height / extent[1])
 
 
 def nest(charts: list[list[Mask]], order: NDArray[np.int64], columns: int, *, most: float = math.inf) -> Nest | None:

@@ -6,14 +6,14 @@ k charts · cells: the unit of length on the way.  It finds what `placement` can
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..growing.outlines import is_rectangle
 from ..growing.outlines import rotation as rotation_by
 from .bitmap import Mask, Nest, mask_of, nest
-from .placement import Layout
+from .placement import UNIT, Layout
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,6 +30,7 @@ def find_nested(
     rng: np.random.Generator,
     *,
     rotation: Rotation = "any",
+    extent: NDArray[np.float64] = UNIT,
 ) -> Layout | None:
     """The best layout found; None where there are too few or too many charts for it, or the padding leaves no room.
 
@@ -37,34 +38,37 @@ def find_nested(
         outlines: k upright outlines (s, 2, 2), source units.
         folded: (k,) bool, charts whose holes are none.
         area: of all charts, source units squared.
-        padding: share of the atlas side.
+        padding: share of the side of the page.
         config: numbers.
         rng: for the orders that are tried.
         rotation: how charts may be turned.
+        extent: (2,) width and height of the page, the longer one 1.
     """
     if not 1 < len(outlines) <= config.most:
         return None
     quarters = 1 if rotation == "off" else 4
     slants = 1 if rotation != "any" else config.slants
-    unit = config.side * math.sqrt(config.fill / area)
+    unit = config.side * math.sqrt(config.fill * float(extent.prod()) / area)
+    columns = round(config.side * float(extent[0]))
     for _ in range(config.sizings):
         charts = [
             _masks(*one, unit, padding * config.side * config.more, (slants, quarters))
             for one in zip(outlines, folded.tolist(), strict=True)
         ]
         keys = np.array([max(masks[0].width, masks[0].height) for masks in charts], dtype=np.float64)
-        found = nest(charts, np.argsort(-keys, kind="stable"), config.side)
-        if found is not None and found.side <= config.more * config.side:
+        found = nest(charts, np.argsort(-keys, kind="stable"), columns)
+        if found is not None and found.side(extent) <= config.more * config.side:
             break
-        unit *= 0.5 if found is None else config.side / found.side
+        unit *= 0.5 if found is None else config.side / found.side(extent)
     else:
         return None
-    found = _improved(charts, found, keys, config, rng)
+    found = _improved(charts, _Best(found, keys, extent), config, rng)
     chosen = found.mask.tolist()
     offset = np.array([masks[number].offset for masks, number in zip(charts, chosen, strict=True)])
     tried = np.array([len(masks) // quarters for masks in charts])
     angle = (found.mask // quarters) * (0.5 * math.pi / tried) + (found.mask % quarters) * (0.5 * math.pi)
-    return Layout(angle, (found.place + offset) / found.side, unit / found.side)
+    side = found.side(extent)
+    return Layout(angle, (found.place + offset) / side, unit / side)
 
 
 def _masks(
@@ -81,16 +85,24 @@ def _masks(
     return masks
 
 
-def _improved(
-    charts: list[list[Mask]], found: Nest, keys: NDArray[np.float64], config: NestConfig, rng: np.random.Generator
-) -> Nest:
-    """Other orders in fewer columns, from the best so far, as often as the number of charts allows."""
-    first = best = keys
+class _Best(NamedTuple):
+    """The layout that needs least so far, the keys (k,) that ordered it, and the page's extent."""
+
+    nest: Nest
+    keys: NDArray[np.float64]
+    extent: NDArray[np.float64]
+
+
+def _improved(charts: list[list[Mask]], start: _Best, config: NestConfig, rng: np.random.Generator) -> Nest:
+    """Other orders on a smaller page, from the best so far, as often as the number of charts allows."""
+    found, best, extent = start
+    first = best
     for number in range(min(config.tries, config.dropped // len(charts))):
         spread = config.shuffle * np.exp(rng.normal())
         keys = (first if number % 4 == 0 else best) * np.exp(spread * rng.normal(size=len(charts)))
         order = np.argsort(-keys, kind="stable")
-        other = nest(charts, order, found.side - 1, most=found.side - 1)
+        width, height = (math.ceil(found.side(extent) * share) - 1 for share in extent.tolist())
+        other = nest(charts, order, width, most=height)
         if other is not None:
             found, best = other, keys
     return found

@@ -1,7 +1,7 @@
-"""The search for a layout: the size at which charts fill the square, then orders and widths that need less of it.
+"""The search for a layout: the size at which charts fill the page, then orders and widths that need less of it.
 
 k charts · cells: the unit of length on the way, the width of a column of the skyline (`skyline`).  A layout that needs
-a square of R cells becomes the atlas by a division by R; the smaller R, the larger the charts.
+a page of R cells along its longer side becomes the atlas by a division by R; the smaller R, the larger the charts.
 """
 
 from __future__ import annotations
@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 
     from ..config import PlaceConfig, Rotation
 
+UNIT = np.ones(2)
+"""Extent of a square page."""
+
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where the charts of one atlas lie.
+    """Where the charts of one atlas lie, in sides of the page.
 
-    angle: (k,) radians by which each is turned, on top of standing upright.  origin: (k, 2) atlas units, where the
-    origin of its turned coordinates goes.  scale: atlas units per source unit.
+    angle: (k,) radians by which each is turned, on top of standing upright.  origin: (k, 2) where the origin of its
+    turned coordinates goes.  scale: of a source unit.
     """
 
     angle: NDArray[np.float64]
@@ -51,7 +54,7 @@ class _Shapes:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What the search has: where charts lie, the square's side in cells, and the keys (k,) that order them."""
+    """What the search has: where charts lie, the page's longer side in cells, and the keys (k,) that order them."""
 
     drop: Drop
     side: float
@@ -62,13 +65,14 @@ class _Found:
 class _Outlines:
     """Upright outlines (k of (s, 2, 2)) of charts of that area, source units, and how they may be turned.
 
-    long: length of a chart, in sides of a square of the area, from which diagonals are tried.
+    long: length of a chart, in sides of a square of the area, from which diagonals are tried.  extent: of the page.
     """
 
     outlines: list[NDArray[np.float64]]
     area: float
     rotation: Rotation
     long: float
+    extent: NDArray[np.float64]
 
     def shapes(self, unit: float, padding: float) -> _Shapes:
         """Profiles at that size, at each angle they may have."""
@@ -100,23 +104,25 @@ def find_layout(
     rng: np.random.Generator,
     *,
     rotation: Rotation = "any",
+    extent: NDArray[np.float64] = UNIT,
 ) -> Layout:
     """The best layout found.
 
     Args:
         outlines: k upright outlines (s, 2, 2), source units.
         area: of all charts, source units squared.
-        padding: share of the atlas side.
+        padding: share of the side of the page.
         config: numbers.
         rng: for the orders that are tried.
         rotation: how charts may be turned.
+        extent: (2,) width and height of the page, the longer one 1.
 
     Raises:
         InputError: the padding leaves no room for the charts.
     """
     columns = int(min(max(config.columns * math.sqrt(len(outlines)), config.least), config.most))
-    shapes, found = _sized(_Outlines(outlines, area, rotation, config.long), padding, columns, config)
-    found = _improved(shapes, found, config, rng)
+    shapes, found = _sized(_Outlines(outlines, area, rotation, config.long, extent), padding, columns, config)
+    found = _improved(shapes, found, config, rng, extent)
     chosen, rows = found.drop.angle.tolist(), range(len(outlines))
     offset = np.array([shapes.charts[chart][chosen[chart]].offset for chart in rows])
     angle = np.array([shapes.angle[chart][chosen[chart]] for chart in rows])
@@ -124,16 +130,16 @@ def find_layout(
 
 
 def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfig) -> tuple[_Shapes, _Found]:
-    """Shapes of the size at which a first layout needs almost all of the columns, never more, and that layout.
+    """Shapes of the size at which a first layout needs almost all of a page of so many cells, and that layout.
 
-    The padding is a share of the columns: in a square of as many or fewer it is kept.
+    It never needs more.  The padding is a share of its longer side: on a page of as many cells or fewer it is kept.
     """
-    k = len(outlines.outlines)
-    first = unit = columns * math.sqrt(config.fill / outlines.area)
+    k, extent = len(outlines.outlines), outlines.extent
+    first = unit = columns * math.sqrt(config.fill * float(extent.prod()) / outlines.area)
     room = 2.0 * padding * columns * math.sqrt(k)  # what padding takes does not shrink with the charts
     shapes = outlines.shapes(unit, padding * columns)
     for _ in range(config.sizings):
-        found = _first(shapes, columns, config)
+        found = _first(shapes, columns, config, extent)
         if (1.0 - config.alike) * columns <= found.side <= columns:
             return shapes, found
         if unit < 1e-4 * first:
@@ -141,7 +147,7 @@ def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfi
         wanted = ((1.0 - config.alike / 2.0) * columns - room) / max(found.side - room, 1e-9)
         unit *= min(max(wanted, 0.25), 2.0) if room < columns else 0.25
         shapes = outlines.shapes(unit, padding * columns)
-    found = _first(shapes, columns, config)
+    found = _first(shapes, columns, config, extent)
     if found.side > columns:
         raise InputError(
             f"{k} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
@@ -150,32 +156,35 @@ def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfi
     return shapes, found
 
 
-def _first(shapes: _Shapes, columns: int, config: PlaceConfig) -> _Found:
-    """The layout of charts in the order of their size, in the better of two squares."""
-    found = _dropped(shapes, shapes.extent, max(columns, shapes.narrowest), config.tightness)
-    width = max(int(math.sqrt(found.drop.width * found.drop.height)), shapes.narrowest)
-    again = _dropped(shapes, shapes.extent, width, config.tightness)
+def _first(shapes: _Shapes, columns: int, config: PlaceConfig, extent: NDArray[np.float64]) -> _Found:
+    """The layout of charts in the order of their size, on the better of two pages."""
+    wide, form = math.ceil(columns * float(extent[0])), float(extent[0] / extent[1])
+    found = _dropped(shapes, max(wide, shapes.narrowest), config.tightness, extent)
+    width = max(int(math.sqrt(found.drop.width * found.drop.height * form)), shapes.narrowest)
+    again = _dropped(shapes, width, config.tightness, extent)
     return again if again.side < found.side else found
 
 
-def _dropped(shapes: _Shapes, keys: NDArray[np.float64], width: int, tightness: float) -> _Found:
-    found = drop(shapes.charts, np.argsort(-keys, kind="stable"), width, tightness=tightness)
+def _dropped(shapes: _Shapes, width: int, tightness: float, extent: NDArray[np.float64]) -> _Found:
+    found = drop(shapes.charts, np.argsort(-shapes.extent, kind="stable"), width, tightness=tightness)
     assert found is not None, "no chart is wider than the columns"
-    return _Found(found, found.side, keys)
+    return _Found(found, found.side(extent), shapes.extent)
 
 
-def _improved(shapes: _Shapes, found: _Found, config: PlaceConfig, rng: np.random.Generator) -> _Found:
-    """Other orders and a narrower square, from the best so far, as often as the number of charts allows."""
-    k = len(shapes.charts)
+def _improved(
+    shapes: _Shapes, found: _Found, config: PlaceConfig, rng: np.random.Generator, extent: NDArray[np.float64]
+) -> _Found:
+    """Other orders and a narrower page, from the best so far, as often as the number of charts allows."""
+    k, (wide, high) = len(shapes.charts), extent.tolist()
     tries = min(config.tries, config.dropped // k) if k > 1 else 0
     for number in range(tries):
-        width = max(math.ceil(found.side) - 1 - int(rng.integers(0, 3)), shapes.narrowest)
+        width = max(math.ceil(found.side * wide) - 1 - int(rng.integers(0, 3)), shapes.narrowest)
         spread = config.shuffle * np.exp(rng.normal(size=1))
         source = shapes.extent if number % 4 == 0 else found.keys
         keys = source * np.exp(spread * rng.normal(size=k))
         tightness = config.tightness * float(np.exp(rng.normal()))
         order = np.argsort(-keys, kind="stable")
-        moved = drop(shapes.charts, order, width, tightness=tightness, most=found.side)
-        if moved is not None and moved.side < found.side:
-            found = replace(found, drop=moved, side=moved.side, keys=keys)
+        moved = drop(shapes.charts, order, width, tightness=tightness, most=found.side * high)
+        if moved is not None and moved.side(extent) < found.side:
+            found = replace(found, drop=moved, side=moved.side(extent), keys=keys)
     return found

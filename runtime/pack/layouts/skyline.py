@@ -67,14 +67,13 @@ class Drop:
         return float(np.flatnonzero(self.skyline)[-1] + 1)
 
     @cached_property
-    def side(self) -> float:
-        """Of the square that holds all, in cells."""
-        return max(self.width, self.height)
-
-    @cached_property
     def height(self) -> float:
         """The highest point, in cells."""
         return float(self.skyline.max())
+
+    def side(self, extent: NDArray[np.float64]) -> float:
+        """The longer side of the page of that form that holds all, in cells.  extent: (2,) of it, sides of the page."""
+        return max(self.width / extent[0], self.height / extent[1])
 
 
 def profile(outline: NDArray[np.float64], padding: float) -> Profile:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from flexpara.bake.baker import bake
 from flexpara.bake.files.gltf import glb_bytes, write_glb
 from flexpara.bake.files.images import quantize, read_image
 from flexpara.bake.maps.tangents import vertex_tangents
+from flexpara.bake.texture import Texture
 from flexpara.runtime.errors import ShapeError
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.material import SLOTS, Material, Picture
@@ -192,11 +192,18 @@ def test_a_single_material_keeps_its_name_and_factor(quad: Pair) -> None:
     assert material.pbrMetallicRoughness.baseColorFactor == [0.5, 0.25, 0.125, 1.0]
 
 
-def test_an_open_surface_is_seen_from_both_sides(quad: Pair, pair: Callable[..., Pair]) -> None:
-    tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
-    closed = pair([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], tetrahedron, [[0, 0], [1, 0], [0, 1], [1, 1]])
+def test_an_open_surface_is_seen_from_both_sides(quad: Pair, closed: Pair) -> None:
     assert parse(glb_bytes(*quad, {})).materials[0].doubleSided is True
-    assert parse(glb_bytes(*closed, {})).materials[0].doubleSided is False
+    painted = closed[0], replace(closed[1], materials=(Material(),))
+    assert parse(glb_bytes(*painted, {})).materials[0].doubleSided is False
+
+
+def test_a_bare_closed_mesh_gains_no_material(closed: Pair) -> None:
+    document = parse(glb_bytes(*closed, {}))
+    assert document.materials == []
+    assert document.meshes[0].primitives[0].material is None
+    white = {"base-color": Texture(np.ones((4, 4, 3), np.float32), "srgb", 8, "png")}
+    assert len(parse(glb_bytes(*closed, white)).materials) == 1
 
 
 def test_metadata_travels_in_the_extras(quad: Pair) -> None:

@@ -38,3 +38,9 @@ def test_values_are_linear_light_of_any_size() -> None:
         assert card.shape == (size, size, 3)
         assert card.min() >= 0.0
         assert card.max() <= 1.0
+
+
+def test_cells_stay_square_on_a_page_that_is_not() -> None:
+    card = uv_card("512x256")
+    assert card.shape == (256, 512, 3)
+    np.testing.assert_array_equal(card, uv_card(512)[256:])

@@ -177,6 +177,16 @@ def test_the_command_writes_beside_the_result_and_only_over_its_own(
     assert main(["report"]) == 2
 
 
+def test_a_folder_of_two_results_gets_one_page_of_both(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("card.report.json", "card.obj"):
+        (folder / name.replace("card", "twin")).write_bytes((folder / name).read_bytes())
+    assert main(["report", str(folder)]) == 0
+    page = folder / "results.report.html"
+    assert capsys.readouterr().out.strip() == str(page)
+    text = page.read_text(encoding="utf-8")
+    assert "<title>card · twin" in text
+
+
 def test_three_js_is_the_version_it_is_said_to_be_with_its_licence() -> None:
     three = files("flexpara.bake.report") / "site" / "three"
     note = (three / "README.md").read_text(encoding="utf-8")

@@ -10,9 +10,14 @@ import pytest
 
 from flexpara.bake.baker import bake
 from flexpara.bake.files.images import read_image
+from flexpara.bake.maps.catalogue import find_map
 from flexpara.bake.results.udim import bake_udim, tile_of, udim_names, udim_tiles, write_udim
+from flexpara.bake.seams.across import on_tall_page, stacked
+from flexpara.bake.seams.seamcheck import find_seams, page_of, sample_seams, seam_error
+from flexpara.bake.texture import as_texture
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas
+from flexpara.runtime.pack.packing import atlas_of_corners
 
 Pair = tuple[Atlas, Asset]
 
@@ -47,6 +52,29 @@ def test_a_tile_holds_what_its_charts_alone_would_give(spread: Pair, two_charts:
             tile = tiles[number][name].pixels
             assert np.abs(tile[:, columns] - whole[name].pixels[:, columns]).max() < 1e-5
         assert set(np.unique(tiles[number]["face-id"].pixels)) == faces
+
+
+def test_seams_between_tiles_are_closed_as_those_within_one_are(sphere: Pair) -> None:
+    """The sphere in two halves, each in a tile: both sides of the meridians between them give one value."""
+    atlas, asset = sphere
+    half = (atlas.uv[atlas.faces, 0].mean(axis=1) > 0.5).astype(np.int64)
+    uv = atlas.uv[atlas.faces].astype(np.float64) * 0.9 + 0.05 + np.stack([half, 0 * half], axis=1)[:, None]
+    spread = atlas_of_corners(asset, half, uv.astype(np.float32), atlas)
+    names = ["position", "face-id"]
+    tiles = bake_udim(spread, asset, names, size="48x64")
+    alone = [bake(spread, asset, names, size="48x64", tile=tile_of(number)) for number in tiles]
+
+    def error(images: list[np.ndarray]) -> float:
+        tall = on_tall_page(spread, [(0, 0), (1, 0)], 64)
+        texture = as_texture(find_map("position"), stacked(images))
+        measured = seam_error(texture, sample_seams(find_seams(tall), page_of(texture.pixels)))
+        assert measured is not None
+        return measured.maximum
+
+    closed = error([tile["position"].pixels for tile in tiles.values()])
+    assert closed < 0.3 * error([tile["position"].pixels for tile in alone])
+    for tile, other in zip(tiles.values(), alone, strict=True):
+        np.testing.assert_array_equal(tile["face-id"].pixels, other["face-id"].pixels)
 
 
 def test_a_chart_over_a_border_is_drawn_on_both_sides(quad: Pair) -> None:

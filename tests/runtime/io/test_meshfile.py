@@ -262,3 +262,29 @@ def test_real_meshes_keep_their_faces_in_order(
     )
     if all(len(line.split()) == 4 for line in text if line.startswith("f ")):
         np.testing.assert_array_equal(asset.positions[asset.faces], points[corners - 1])
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [
+        ("a.fbx", "import it in Blender and export glTF"),
+        ("a.blend", "export glTF"),
+        ("a.usdz", "export .glb"),
+        ("a.igs", "tessellate them"),
+        ("a.max", "export .glb or .obj there"),
+    ],
+)
+def test_formats_that_people_bring_and_none_reads_name_the_way_out(tmp_path: Path, name: str, remedy: str) -> None:
+    (tmp_path / name).write_bytes(b"Kaydara FBX Binary  ")
+    with pytest.raises(MeshError, match=remedy):
+        load_asset(tmp_path / name)
+
+
+@pytest.mark.parametrize("kind", ["3mf", "dae"])
+def test_formats_of_the_extra_come_in_with_their_triangles(tmp_path: Path, kind: str) -> None:
+    box = trimesh.creation.box((1.0, 2.0, 3.0))
+    box.export(tmp_path / f"box.{kind}")
+    found = load_asset(tmp_path / f"box.{kind}")
+    assert len(found.faces) == 12
+    np.testing.assert_allclose(np.sort(np.ptp(found.positions, axis=0)), [1.0, 2.0, 3.0], atol=1e-6)
+    assert found.surface.face_areas().sum() == pytest.approx(22.0)

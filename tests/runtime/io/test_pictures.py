@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from PIL import Image
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.obj.materials import read_mtl
 from flexpara.runtime.io.pictures.colors import linear_to_srgb
-from flexpara.runtime.io.pictures.pictures import decode_image, read_in_folder
+from flexpara.runtime.io.pictures.pictures import PNG, decode_image, is_deep, read_in_folder
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -27,6 +29,31 @@ def test_every_kind_of_picture_becomes_rgba() -> None:
     assert decoded.shape == (2, 2, 4)
     np.testing.assert_array_equal(decoded[:, :, 0], grey)
     np.testing.assert_array_equal(decoded[:, :, 3], 255)
+
+
+def deep_png(levels: np.ndarray) -> bytes:
+    """(h, w, c) uint16 as a PNG of 16 bits a channel."""
+
+    def chunk(name: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+    height, width, channels = levels.shape
+    head = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, 0)
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in levels)
+    return PNG + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+def test_of_16_bits_a_channel_the_upper_8_are_kept(channels: int) -> None:
+    levels = np.arange(0, 65536, 257, dtype=np.uint16).reshape(16, 16, 1).repeat(channels, axis=2)
+    data = deep_png(levels)
+    decoded = decode_image(data)
+    np.testing.assert_array_equal(decoded[..., 0], np.arange(256).reshape(16, 16))
+    np.testing.assert_array_equal(decoded[..., 3], 255 if channels % 2 else np.arange(256).reshape(16, 16))
+    assert is_deep(data)
+    assert not is_deep(png(decoded))
+    _, changes = read_mtl(b"newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd a.png\n", lambda _: data)
+    assert changes == {"missing_textures": 0, "textures_to_8_bits": 1}
 
 
 def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,8 +91,8 @@ def test_names_reach_only_files_of_the_folder(tmp_path: Path) -> None:
 
 def test_a_material_library_gives_factors_and_counts_missing_pictures() -> None:
     text = b"junk 1\nnewmtl a b\nKd 0.25\nnewmtl c\nKd 2 -1 0.5\nmap_Kd gone.png\n"
-    materials, missing = read_mtl(text, lambda _: None)
-    assert missing == 1
+    materials, changes = read_mtl(text, lambda _: None)
+    assert changes == {"missing_textures": 1, "textures_to_8_bits": 0}
     assert materials["a b"].base_color_factor == (0.25, 0.25, 0.25, 1.0)
     assert materials["c"].base_color_factor == (1.0, 0.0, 0.5, 1.0)
     with pytest.raises(MeshError, match="expected numbers"):
@@ -82,9 +109,9 @@ def test_physically_based_lines_and_clamping_are_read() -> None:
     stream = io.BytesIO()
     Image.new("RGBA", (2, 2), (9, 8, 7, 128)).save(stream, "PNG")
     text = b"newmtl a\nmap_Kd -clamp on a.png\nnorm n.png\nmap_Ke gone.png\nKe 0.5\nPm 1\nPr 0.25\n"
-    materials, missing = read_mtl(text, lambda name: None if name == "gone.png" else stream.getvalue())
+    materials, changes = read_mtl(text, lambda name: None if name == "gone.png" else stream.getvalue())
     material = materials["a"]
-    assert missing == 1
+    assert changes["missing_textures"] == 1
     assert set(material.pictures) == {"base-color", "normal"}
     assert material.pictures["base-color"].wrap == ("clamp", "clamp")
     assert material.pictures["normal"].wrap == ("repeat", "repeat")

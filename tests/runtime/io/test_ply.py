@@ -7,6 +7,7 @@ import pytest
 
 from flexpara.runtime.errors import InputError, MeshError
 from flexpara.runtime.io.ply.header import ply_header
+from flexpara.runtime.io.ply.leftout import left_out
 from flexpara.runtime.io.ply.read import read_ply, read_ply_points
 from flexpara.runtime.io.rawmesh import RawMesh
 
@@ -183,3 +184,14 @@ def test_lists_of_negative_length_are_refused() -> None:
     elements = vertex(FIELDS[:3], 3) + "element face 1\nproperty list int int vertex_indices\n"
     with pytest.raises(MeshError, match="row 0 of PLY element 'face' has a list of -3"):
         read_ply(head("ascii", elements) + b"0 0 0 1 0 0 0 1 0 -3 0 1 2\n", {}.get)
+
+
+def test_what_is_not_read_is_counted() -> None:
+    splat = [("float", name) for name in ("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "rot_0")]
+    assert left_out(ply_header(head("ascii", vertex(splat, 5)))) == {"skipped_splat_shapes": 5}
+    other = [*FIELDS, ("float", "quality"), ("int", "label")]
+    assert left_out(ply_header(head("ascii", vertex(other) + "element edge 3\nproperty int vertex1\n"))) == {
+        "skipped_properties": 2,
+        "skipped_elements": 1,
+    }
+    assert left_out(ply_header(head("ascii", vertex(FIELDS)))) == {}

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from flexpara.runtime.pagesize import Size
+
 UNIT = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
 
 
@@ -59,7 +61,7 @@ def box_charts(surface: Surface) -> Charts:
     return Charts(chart, uv, chart, np.arange(k), ("slim",) * k)
 
 
-def packed(asset: Asset, charts: Charts, *, size: int, padding: int, seed: int = 0) -> Atlas:
+def packed(asset: Asset, charts: Charts, *, size: Size, padding: int, seed: int = 0) -> Atlas:
     """The atlas of charts that all come out valid."""
     found = pack(asset, charts, size=size, padding=padding, seed=seed)
     assert found.invalid.tolist() == []
@@ -74,11 +76,11 @@ def measured_gap(asset: Asset, atlas: Atlas) -> float:
 
 def assert_valid(asset: Asset, charts: Charts, atlas: Atlas) -> None:
     """What every packed atlas promises, whatever went in."""
-    uv = atlas.corner_uv
-    border = atlas.padding / atlas.size
+    uv, extent = atlas.corner_uv, atlas.page.extent
+    border = atlas.padding / np.array(atlas.page)
     assert np.array_equal(np.rint(uv * 2.0**24), uv * 2.0**24)
-    assert uv.min() >= border
-    assert uv.max() <= 1.0 - border
+    assert (uv >= border).all()
+    assert (uv <= 1.0 - border).all()
     assert len(overlapping_pairs(uv)) == 0
     assert np.array_equal(np.sign(signed_areas(uv)), np.sign(signed_areas(charts.corner_uv)))
     assert np.array_equal(atlas.source_vertex[atlas.faces], asset.faces)
@@ -86,7 +88,7 @@ def assert_valid(asset: Asset, charts: Charts, atlas: Atlas) -> None:
     assert atlas.placement is not None
     exact = apply_placement(atlas.placement, charts.face_chart, charts.corner_uv)
     assert np.abs(exact - uv).max() < 3e-7
-    linear = atlas.placement[:, :, :2]
+    linear = atlas.placement[:, :, :2] * extent[:, None]
     scale = np.sqrt(np.linalg.det(linear))
     assert scale == pytest.approx(np.full(len(scale), scale[0]))
     assert linear @ linear.transpose(0, 2, 1) == pytest.approx(scale[:, None, None] ** 2 * np.eye(2)[None], abs=1e-12)
@@ -118,6 +120,27 @@ def test_rectangles_of_all_sizes_keep_padding_scale_and_orientation(seed: int) -
     atlas = packed(asset, charts, size=512, padding=4, seed=seed)
     assert_valid(asset, charts, atlas)
     assert measured_gap(asset, atlas) >= 8.0
+
+
+@pytest.mark.parametrize("size", ["512x256", "192x512", "1000x300"])
+def test_a_page_that_is_not_square_is_filled_by_charts_of_one_scale_and_true_shape(size: str) -> None:
+    rng = np.random.default_rng(1)
+    asset, charts = rectangles(rng.uniform(0.1, 1.0, (12, 2)), rng.uniform(0.0, 6.0, 12))
+    atlas = packed(asset, charts, size=size, padding=3)
+    assert_valid(asset, charts, atlas)
+    assert measured_gap(asset, atlas) >= 6.0 - 1e-4
+    metrics = measure(asset.surface, atlas.corner_uv, atlas.face_chart, size=size)
+    assert metrics.symmetric_dirichlet_mean == pytest.approx(1.0, abs=1e-6)
+    density = [metrics.texel_density_min, metrics.texel_density_max]
+    assert density == pytest.approx([density[0]] * 2, rel=1e-3)
+    assert metrics.packing_efficiency > 0.6
+
+
+def test_a_lone_chart_lies_along_the_longer_side_of_its_page() -> None:
+    asset, charts = rectangles(np.array([[1.0, 2.0]]), np.array([0.4]))
+    for size in ("512x256", "256x512"):
+        atlas = packed(asset, charts, size=size, padding=0)
+        assert float(np.abs(signed_areas(atlas.corner_uv)).sum()) == pytest.approx(1.0, abs=1e-4)
 
 
 def test_many_charts_and_few_texels_still_keep_their_distance() -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from flexpara.runtime.geometry.gaps import smallest_chart_gap
 from flexpara.runtime.pack.config import GrowthConfig
 from flexpara.runtime.pack.growing.growth import apply_placement, grown
+from flexpara.runtime.pagesize import PageSize
 
 CONFIG = GrowthConfig()
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -26,13 +27,13 @@ def test_a_placement_is_an_affine_map_per_chart() -> None:
 
 
 def test_one_square_fills_the_atlas() -> None:
-    found, _ = grown(placed((0.3, 0.2, 0.2)), [SQUARE], 64, 4, CONFIG)
+    found, _ = grown(placed((0.3, 0.2, 0.2)), [SQUARE], PageSize(64, 64), 4, CONFIG)
     assert found == pytest.approx(placed((4 / 64, 4 / 64, 56 / 64)), abs=1e-6)
 
 
 def test_two_squares_on_a_diagonal_jam_at_the_closed_form() -> None:
     """Corner to corner they are 2·padding apart along the diagonal: side = (64 − 2·4 − 8/√2) / 2 or better."""
-    found, _ = grown(placed((0.1, 0.1, 0.3), (0.55, 0.55, 0.3)), [SQUARE, SQUARE], 64, 4, CONFIG)
+    found, _ = grown(placed((0.1, 0.1, 0.3), (0.55, 0.55, 0.3)), [SQUARE, SQUARE], PageSize(64, 64), 4, CONFIG)
     side = found[0, 0, 0] * 64
     assert side >= (64 - 8 - 8 / np.sqrt(2.0)) / 2.0 - 1e-3
     assert found[1, 0, 0] == found[0, 0, 0]
@@ -41,7 +42,7 @@ def test_two_squares_on_a_diagonal_jam_at_the_closed_form() -> None:
 @pytest.mark.parametrize("padding", [0, 2, 6])
 def test_loose_squares_come_to_lie_exactly_as_close_as_the_padding_allows(padding: int) -> None:
     start = placed((0.06, 0.05, 0.4), (0.54, 0.06, 0.4), (0.05, 0.55, 0.4), (0.55, 0.54, 0.4))
-    found, _ = grown(start, [SQUARE] * 4, 128, padding, CONFIG)
+    found, _ = grown(start, [SQUARE] * 4, PageSize(128, 128), padding, CONFIG)
     segments = apply_placement(found, np.repeat(np.arange(4), 4), np.concatenate([SQUARE] * 4))
     gap = smallest_chart_gap(segments, np.repeat(np.arange(4), 4), spacing=1 / 512)
     assert gap is not None
@@ -55,7 +56,7 @@ def test_loose_squares_come_to_lie_exactly_as_close_as_the_padding_allows(paddin
 def test_turns_are_kept_and_the_scale_stays_common() -> None:
     start = placed((0.1, 0.1, 0.3), (0.8, 0.5, 0.3))
     start[1, :, :2] = 0.3 * np.array([[0.0, -1.0], [1.0, 0.0]])
-    found, _ = grown(start, [SQUARE, SQUARE], 64, 2, CONFIG)
+    found, _ = grown(start, [SQUARE, SQUARE], PageSize(64, 64), 2, CONFIG)
     factor = found[0, 0, 0] / 0.3
     assert factor > 1.0
     assert found[:, :, :2] == pytest.approx(factor * start[:, :, :2])

@@ -43,18 +43,18 @@ def test_a_closed_chart_is_named() -> None:
 def test_a_rectangle_stands_upright_again(angle: float) -> None:
     outline = chart_outlines(charts_of(QUAD[FACES], [0, 0]), outline_edges(FACES, charts_of(QUAD[FACES], [0, 0])))[0]
     turned = outline @ rotation(angle).T
-    upright = turned @ rotation(upright_angle(turned, square=False)).T
+    upright = turned @ rotation(upright_angle(turned)).T
     assert sorted(np.ptp(upright.reshape(-1, 2), axis=0).tolist()) == pytest.approx([1.0, 2.0])
 
 
 def test_points_on_a_line_lie_flat() -> None:
     line = np.array([[[0.0, 0.0], [3.0, 4.0]], [[3.0, 4.0], [0.0, 0.0]]])
-    turned = line @ rotation(upright_angle(line, square=False)).T
+    turned = line @ rotation(upright_angle(line)).T
     assert sorted(np.ptp(turned.reshape(-1, 2), axis=0).tolist()) == pytest.approx([0.0, 5.0], abs=1e-12)
 
 
 def test_a_pole_alone_is_turned_so_that_its_bounding_square_is_small() -> None:
     charts = charts_of(QUAD[FACES] * [5.0, 0.1], [0, 0])
     (pole,) = chart_outlines(charts, outline_edges(FACES, charts))
-    turned = pole @ rotation(upright_angle(pole, square=True)).T
+    turned = pole @ rotation(upright_angle(pole, np.ones(2))).T
     assert np.ptp(turned.reshape(-1, 2), axis=0).max() == pytest.approx(10.1 * np.sqrt(0.5), rel=0.01)
