@@ -28,22 +28,23 @@ inline Index vertex_span(const Index* faces, std::size_t corners) {
 inline EdgeTable edge_table(const Index* faces, std::size_t count) {
     const std::size_t halves = 3 * count;
     auto end_of = [&](Index half) { return faces[next_halfedge(half)]; };
-    std::vector<Index> begin(vertex_span(faces, halves) + 1, 0);
+    // 32 bits hold what there can be, and half as much memory is gone through
+    std::vector<std::uint32_t> begin(vertex_span(faces, halves) + 1, 0);
     for (std::size_t h = 0; h < halves; ++h) ++begin[std::min(faces[h], end_of(h)) + 1];
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    std::vector<std::pair<Index, Index>> sorted(halves);  // (higher vertex, half-edge)
-    std::vector<Index> filled(begin.begin(), begin.end());
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> sorted(halves);  // (higher vertex, half-edge)
+    std::vector<std::uint32_t> filled(begin.begin(), begin.end());
     for (std::size_t h = 0; h < halves; ++h)
-        sorted[filled[std::min(faces[h], end_of(h))]++] = {std::max(faces[h], end_of(h)), Index(h)};
+        sorted[filled[std::min(faces[h], end_of(h))]++] = {std::uint32_t(std::max(faces[h], end_of(h))), std::uint32_t(h)};
     EdgeTable table;
     table.face_edges.resize(halves);
     for (auto* pairs : {&table.edges, &table.edge_faces, &table.edge_halfedges}) pairs->reserve(halves / 2 + halves / 8);
     table.edge_count.reserve(halves / 2 + halves / 8);
     for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
         std::sort(sorted.begin() + begin[low], sorted.begin() + begin[low + 1]);
-        for (Index at = begin[low]; at < begin[low + 1]; ++at) {
-            const auto [high, half] = sorted[at];
-            if (at == begin[low] || sorted[at - 1].first != high) {
+        for (std::size_t at = begin[low]; at < begin[low + 1]; ++at) {
+            const Index high = sorted[at].first, half = sorted[at].second;
+            if (at == begin[low] || sorted[at - 1].first != sorted[at].first) {
                 table.edges.push_back({Index(low), high});
                 table.edge_halfedges.push_back({half, -1});
                 table.edge_faces.push_back({half / 3, -1});
