@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -103,13 +103,20 @@ def row(tool: str, mesh: Mesh, budget: float, folder: Path) -> str:
     with np.load(answer) as found:
         uv = found["uv"].astype(np.float64)[found["faces"]]
         seconds = float(found["seconds"])
-    asset = clean(RawMesh(mesh.vertices, mesh.faces, face_material=np.arange(len(mesh.faces))))
-    assert asset.face_material is not None
-    turned = asset.faces[:, 1] != mesh.faces[asset.face_material, 1]
-    uv = np.where(turned[:, None, None], uv[asset.face_material][:, [0, 2, 1]], uv[asset.face_material])
-    found = measure(asset.surface, uv).to_dict()
+    found = measured(mesh, uv)
     measures = f"{found['charts']:,} | {found['seam_length']:.2f} | {found['symmetric_dirichlet_mean']:.4f}"
     return f"{start} {seconds:.1f} ({ended.cpu_seconds:.0f}) | {measures} | {found['flipped_faces']} |"
+
+
+def measured(mesh: Mesh, uv: NDArray[np.float64]) -> dict[str, Any]:
+    """Metrics of uv (f, 3, 2) at the corners of a mesh's faces, those that have an area."""
+    number = np.arange(len(mesh.faces))
+    asset = clean(RawMesh(mesh.vertices, mesh.faces, face_material=number, origin=np.arange(len(mesh.vertices))))
+    assert asset.face_material is not None
+    assert asset.origin is not None
+    own = uv[asset.face_material]
+    turned = asset.origin[asset.faces[:, 1]] != mesh.faces[asset.face_material, 1]
+    return measure(asset.surface, np.where(turned[:, None, None], own[:, [0, 2, 1]], own)).to_dict()
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from benchmarks.dropin import Kept, level_set
+from benchmarks.dropin import Kept, Mesh, level_set, measured
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,3 +29,13 @@ def test_a_level_set_has_about_the_faces_asked_for_and_edges_that_are_not_manifo
     assert 17_000 < len(mesh.faces) < 23_000
     sides = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     assert np.unique(sides, axis=0, return_counts=True)[1].max() > 2
+
+
+def test_uv_are_measured_at_the_corners_they_were_given_for_whatever_cleaning_leaves_out() -> None:
+    """Vertex 0 is of no face, one face has no area, and the last is the only one that is turned over."""
+    corners = [[9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+    mesh = Mesh("square", np.array(corners), np.array([[1, 2, 3], [1, 1, 2], [1, 4, 3]]))
+    uv = mesh.vertices[mesh.faces][:, :, :2]
+    found = measured(mesh, uv)
+    assert (found["charts"], found["seam_length"]) == (1, 0.0)
+    assert found["symmetric_dirichlet_mean"] == pytest.approx(1.0)
