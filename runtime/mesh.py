@@ -99,6 +99,14 @@ class Polygons:
 
 
 @dataclass(frozen=True, eq=False)
+class Stored:
+    """Numbers that a file keeps with its vertices: positions (m, 3) as there, by name (m,) of any kind of number."""
+
+    positions: NDArray[np.float64]
+    values: dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
 class Asset:
     """A mesh file, cleaned: the file's own vertices (split as the file splits them) and the welded surface beneath.
 
@@ -113,6 +121,7 @@ class Asset:
     triangles.  obj: the text of an OBJ file.  smoothing: (f,) int64, the smoothing group of each face, 0 for a flat
     one; None where the file doesn't say.  unsplit: (n,) int64, the file's vertex that each is, where normals split
     some or the asset is a page of another.  whole: of a page, the surface of all pages together, which rays meet.
+    stored: what a PLY file says of its vertices beside these.
     """
 
     positions: NDArray[np.float64]
@@ -135,6 +144,7 @@ class Asset:
     smoothing: NDArray[np.int64] | None = None
     unsplit: NDArray[np.int64] | None = None
     whole: Surface | None = None
+    stored: Stored | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from ..runtime.geometry.cutgraph import SeamPrices
 from ..runtime.geometry.places import PlaceConfig
 from .carry.config import ArcConfig, CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
-from .finish.config import FlapConfig, ProjectConfig, SlitConfig
+from .finish.config import EnergyConfig, FlapConfig, ProjectConfig, SlitConfig
 from .seams.config import ClosingConfig
 
 
@@ -124,6 +124,8 @@ class StartConfig:
     """Objective of a search begun, as a multiple of the best one's, beyond which it is not finished."""
     crowded: int = 40
     """Pieces of a start that are valid by themselves above which no further start is searched."""
+    given: int = 200
+    """Charts of an atlas to improve above which its own are no start: a search from so many takes its time."""
     handles: int = 8
     """Handles above which a part has many."""
     worth: float = 0.05
@@ -156,6 +158,20 @@ class SplitConfig:
     """Isolines tried for each seed: those short for what they cut off."""
     energy_left: float = 0.9
     """Share of a chart's energy below which its parts must stay, where it is cut in two whatever the limit."""
+
+
+@dataclass(frozen=True)
+class SymmetryConfig:
+    """Mirrored charts."""
+
+    axis: str = "none"
+    """Across which axis the plane lies: x, y, z, auto for any that there is, none for charts as they come."""
+    exact: float = 1e-4
+    """Distance of vertices from mirror images, as a share of the part's extent, for a plane that is found."""
+    near: float = 1e-3
+    """The same for one that is asked for …"""
+    share: float = 0.9
+    """… where so many of the vertices have an image: the others are charted as those beside them."""
 
 
 @dataclass(frozen=True)
@@ -196,6 +212,10 @@ class FinishConfig:
     """Parts of many faces."""
     haste: HasteConfig = field(default_factory=HasteConfig)
     """Time budgets."""
+    symmetry: SymmetryConfig = field(default_factory=SymmetryConfig)
+    """Mirrored charts."""
+    energy: EnergyConfig = field(default_factory=EnergyConfig)
+    """What finished charts are laid out by."""
     project: ProjectConfig = field(default_factory=ProjectConfig)
     """Charts by projection, where time is out."""
     split: SplitConfig = field(default_factory=SplitConfig)
@@ -258,6 +278,8 @@ class TrainConfig:
     """Seed of all generators."""
     finish: FinishConfig = field(default_factory=FinishConfig)
     places: PlaceConfig = field(default_factory=PlaceConfig)
-    """Prices of seams by place, where hidden ones are asked for or points protected."""
+    """Prices of seams by place, where hidden ones are asked for or faces protected."""
+    importance: float = 2.0
+    """Texels per length where a face is important, as a multiple of those elsewhere."""
     fit: FitConfig = field(default_factory=FitConfig)
     wrap: WrapConfig = field(default_factory=WrapConfig)

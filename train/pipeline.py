@@ -16,7 +16,9 @@ from ..runtime.geometry.topology import edge_table, split_non_manifold_vertices
 from ..runtime.io.asset.wantedseams import NO_WISH
 from ..runtime.mesh import Charts, Frame, Surface
 from ..runtime.progress import Stages
-from .charts.charts import Finished, chart_surface, priced
+from .charts.charts import Finished, chart_surface
+from .charts.objective import priced
+from .charts.starts import Known
 from .deploy.fit import fit_networks
 from .workers import Beside
 
@@ -69,8 +71,8 @@ def train(
         config: numbers.
         progress: told the stages.
         deadline: when the search ends with the best it has; None: it ends by itself, the same every time.
-        wanted: edges that become seams, the surface is cut open there before it is charted; and points, in source
-            units, that seams keep away from.
+        wanted: edges that become seams, the surface is cut open there before it is charted; faces that seams keep
+            away from, and that want texels; and uv of an atlas to improve.
 
     Raises:
         FinishError: no valid charts could be made (a defect).
@@ -78,37 +80,56 @@ def train(
     frame = Frame.of(surface.vertices)
     ball = replace(surface, vertices=frame.apply(surface.vertices))
     opened = ball if wanted.cut is None else cut_along(ball, wanted.cut)
-    protected = None if wanted.protected is None else frame.apply(wanted.protected)
-    finish = at_places(config.finish, ball, config.places, protected)
-    finished = chart_surface(opened, config.charts, finish, config.seed, Stages(progress, deadline))
-    return with_networks(surface, finished, config)
+    finish = at_places(config.finish, ball, config.places, wanted.protected)
+    known = Known(corner_uv=wanted.start)
+    finished = chart_surface(opened, config.charts, finish, config.seed, Stages(progress, deadline), known)
+    return with_networks(surface, finished, config, wanted.important)
 
 
-def with_networks(surface: Surface, finished: Finished, config: TrainConfig) -> Trained:
+def with_networks(
+    surface: Surface, finished: Finished, config: TrainConfig, important: NDArray[np.float64] | None = None
+) -> Trained:
     """Charts of a surface (source units) that were finished in its unit ball, and the networks that answer for them.
 
-    These are fitted beside whatever comes next, which may be packing.
+    These are fitted beside whatever comes next, which may be packing.  important: (f,) how much a face asks for more
+    texels, 0 to 1.
     """
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     charts = as_charts(ball, finished)
     # the unit ball's charts, at the scale of the source: uv in source units
-    charts = replace(charts, corner_uv=charts.corner_uv * frame.scale)
+    density = densities(ball, charts, important, config.importance)
+    charts = replace(charts, corner_uv=charts.corner_uv * (frame.scale * density[charts.face_chart, None, None]))
     fitted = Beside(partial(fit_networks, ball, charts, config.fit, config.seed))
     report = {
         "objective": finished.objective,
         "parts": finished.parts,
         "notes": list(finished.notes),
+        **({} if important is None else {"density": density.tolist()}),
+        **({} if finished.start is None else {"start": finished.start._asdict()}),
         "slit_length": sum(piece.slit_length for piece in finished.pieces),
         "unwrapped_by_xatlas": [k for k, method in enumerate(charts.method) if method == "xatlas"],
     }
     return Trained(charts, fitted, frame, {"preset": "fast", **asdict(config)}, report)
 
 
+def densities(
+    surface: Surface, charts: Charts, important: NDArray[np.float64] | None, most: float
+) -> NDArray[np.float64]:
+    """(k,) texels per length of each chart, beside those of one without importance; most: of one of importance 1."""
+    count = len(charts.method)
+    if important is None:
+        return np.ones(count)
+    area = surface.face_areas()
+    total = np.maximum(np.bincount(charts.face_chart, area, minlength=count), np.finfo(np.float64).tiny)
+    mean = np.bincount(charts.face_chart, area * important, minlength=count) / total
+    return 1.0 + (most - 1.0) * mean
+
+
 def at_places(
     finish: FinishConfig, surface: Surface, config: PlaceConfig, protected: NDArray[np.float64] | None
 ) -> FinishConfig:
-    """The same with prices of seams by place, where hidden ones are asked for or points (n, 3) are protected."""
+    """The same with prices of seams by place, where hidden ones are asked for or faces (f,) protected."""
     if not config.hidden and protected is None:
         return finish
     return priced(finish, replace(finish.slit.seams, places=priced_places(surface, config, protected)))

@@ -9,10 +9,11 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ..runtime.extras import requires
+from ..runtime.io.asset.facevalues import face_values
 from ..runtime.io.asset.wantedseams import wanted_seams
 from ..runtime.mesh import Frame
-from .charts.charts import priced
 from .charts.kept import kept_islands
+from .charts.objective import priced
 from .cloud.config import CloudConfig
 from .cloud.reconstruct import reconstruct
 from .config import TrainConfig
@@ -47,9 +48,10 @@ def train_asset(
     """
     if options.keep_islands:
         config = fast_config(options)
+        important = None if options.importance is None else face_values(asset, options.importance)
         with clock.stage("relax"):
             finished = kept_islands(asset, config.finish)
-        return with_networks(asset.surface, finished, config)
+        return with_networks(asset.surface, finished, config, important)
     if options.preset != "paper":
         wanted = wanted_seams(asset, options, options.crease_angle)
         polygon = None if asset.polygons is None else asset.polygons.of_faces
@@ -87,9 +89,12 @@ def fast_config(options: TrainOptions) -> TrainConfig:
     plain = TrainConfig(charts=options.most_charts, seed=options.seed)
     stretch = 0.0 if options.max_stretch is None else options.max_stretch - 1.0
     finish = replace(plain.finish, slit=replace(plain.finish.slit, price=options.seam_price), stretch=stretch)
+    finish = replace(finish, energy=replace(finish.energy, kind=options.energy))
+    finish = replace(finish, symmetry=replace(finish.symmetry, axis=options.symmetry))
     if options.seams == "crease":
         finish = priced(finish, replace(finish.slit.seams, counted=True))
-    return replace(plain, finish=finish, places=replace(plain.places, hidden=options.seams == "hidden"))
+    places = replace(plain.places, hidden=options.seams == "hidden")
+    return replace(plain, finish=finish, places=places, importance=options.importance_density)
 
 
 def paper_config(options: TrainOptions) -> PaperConfig:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
+import xatlas
 from PIL import Image, ImageDraw
 from trimesh.visual import TextureVisuals
 
@@ -46,6 +47,10 @@ SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
     "seed": ("spot", ({"seed": 0}, {"seed": 1}, {"seed": 2})),
     "seams": ("rocker-arm", ({"seams": "short"}, {"seams": "hidden"}, {"seams": "crease"})),
     "protect": ("spot", ({}, {"protect": "rump.npy"})),
+    "importance": ("spot", ({}, {"importance": "rump.npy"})),
+    "symmetry": ("suzanne", ({}, {"symmetry": "x"})),
+    "energy": ("spot", ({"energy": "isometric"}, {"energy": "conformal"}, {"energy": "arap"})),
+    "start": ("xatlas.obj", ({"keep_islands": True}, {"start": "xatlas.obj"})),
     "hard-edges": ("fandisk", ({"hard_edges": "free"}, {"hard_edges": "split"})),
     "keep-seams": ("spot", ({}, {"keep_seams": ("uv",)}, {"keep_islands": True})),
     "cut": ("spot", ({"charts": 1}, {"charts": 1, "cut": "back.txt"})),
@@ -57,6 +62,8 @@ SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
     "atlas": ("two.glb", ({"atlas": "mesh"},)),
 }
 """Picture: mesh, and the settings that are set side by side; what ends in a suffix is made by `Inputs`."""
+MADE = ("protect", "importance", "cut", "start")
+"""Options whose value is a file that is made."""
 GREY = ("crease-angle",)
 """Pictures in which the light on the shape is what is shown."""
 
@@ -83,6 +90,7 @@ class Inputs:
             "brackets.ply": self._brackets,
             "two.glb": self._two,
             "islands.obj": self._islands,
+            "xatlas.obj": self._xatlas,
         }[name](path)
         return path
 
@@ -125,6 +133,13 @@ class Inputs:
         uv = atlas.uv * np.where(chart[:, None] % 2 == 1, 0.5, 1.0)
         trimesh.Trimesh(atlas.positions, atlas.faces, visual=TextureVisuals(uv), process=False).export(path)
 
+    def _xatlas(self, path: Path) -> None:
+        """Suzanne's atlas by xatlas."""
+        surface = flexpara.load(self.mesh("suzanne")).surface
+        vertex, faces, uv = xatlas.parametrize(surface.vertices, surface.faces)
+        visual = TextureVisuals(np.asarray(uv, dtype=np.float64))
+        trimesh.Trimesh(surface.vertices[vertex], faces, visual=visual, process=False).export(path)
+
 
 def words_of(settings: Mapping[str, Any]) -> str:
     """The settings as one types them."""
@@ -141,7 +156,7 @@ def options(inputs: Inputs, name: str) -> None:
     mesh, several = SHOWN[name]
     columns = []
     for settings in several:
-        given = {key: inputs.made(value) if key in ("protect", "cut") else value for key, value in settings.items()}
+        given = {key: inputs.made(value) if key in MADE else value for key, value in settings.items()}
         columns += unwrapped(inputs.mesh(mesh), given, words_of(settings))
         print(name, *(column.measured for column in columns), sep=" · ", flush=True)
     save(name, sheet(columns, grey=name in GREY))

@@ -35,9 +35,7 @@ class PlaceConfig:
     range: tuple[float, float] = (0.1, 3.0)
     """Least and greatest price of hidden and of open places."""
     protected: float = 10.0
-    """Price where no seam is wanted, as a multiple of what it would be …"""
-    near: float = 0.02
-    """… up to this distance from a protected point, as a share of the surface's extent."""
+    """Price where no seam is wanted, as a multiple of what it would be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ def priced_places(surface: Surface, config: PlaceConfig, protected: NDArray[np.f
     Args:
         surface: any units.
         config: numbers.
-        protected: (n, 3) points near which a seam is dear.
+        protected: (f,) how dear a seam is on a face: 0 as elsewhere, 1 for the price of what is protected.
 
     Raises: MissingDependencyError: hidden ones without flexpara[bake], which has Embree.
     """
@@ -77,7 +75,6 @@ def priced_places(surface: Surface, config: PlaceConfig, protected: NDArray[np.f
     if config.hidden:
         sky = open_sky(surface, faces, config.rays)
         price = np.clip((sky / max(float(sky.mean()), 1e-9)) ** config.power, *config.range)
-    if protected is not None and len(protected):
-        near = config.near * float(np.ptp(surface.vertices, axis=0).max())
-        price = np.where(KDTree(protected).query(points)[0] <= near, config.protected * price, price)
+    if protected is not None:
+        price = price * (1.0 + (config.protected - 1.0) * protected[faces])
     return Places(points, price)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..mesh import Polygons
+    from ..mesh import Polygons, Stored
     from .gltf.document import Document
     from .obj.text import ObjText
 
@@ -37,6 +37,7 @@ class RawMesh:
     (n,) int64, the vertex of that part that each vertex is.  body: (n,) int64, the object that each vertex belongs to;
     vertices of two bodies are never one.  polygons: what the triangles are in the file, where it holds polygons.  obj:
     the text of an OBJ file.  smoothing: (f,) int64, the smoothing group of each face, 0 for a flat one, or None.
+    stored: what a PLY file says of its vertices beside these.
     """
 
     positions: NDArray[np.float64]
@@ -54,6 +55,7 @@ class RawMesh:
     polygons: Polygons | None = None
     obj: ObjText | None = None
     smoothing: NDArray[np.int64] | None = None
+    stored: Stored | None = None
 
 
 def check(raw: RawMesh) -> None:

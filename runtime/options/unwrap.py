@@ -16,7 +16,7 @@ from cyclopts import Parameter
 
 from .atlas import AtlasOptions, Seeded, SourceOptions
 from .seams import AUTO as AUTO
-from .seams import SeamOptions
+from .seams import SeamOptions, fast_alone
 from .words import Flag, Names, demand, demand_known
 
 if TYPE_CHECKING:
@@ -35,8 +35,6 @@ POLYGONS = ("obj", "ply", "usda")
 """Formats that hold polygons of more than three corners."""
 PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_000_000)}
 """Least and most of preset paper's numbers."""
-FAST_ALONE = ("seam_price", "max_stretch", "hard_edges", "keep_seams", "keep_islands", "cut", "seams", "protect")
-"""Options that preset paper has no use for."""
 MOST_PAGES = 1000
 """UDIM has no more tiles."""
 LAST_SET = 7
@@ -92,7 +90,7 @@ class ChartOptions(SeamOptions, SourceOptions):
         fits = self.time_budget is None or (self.time_budget > 0.0 and self.preset == "fast")
         demand(fits, f"time-budget is {self.time_budget}, expected seconds above 0 and preset fast; leave it out")
         demand_known("preset", self.preset, PRESETS)
-        for name in FAST_ALONE if self.preset == "paper" else ():
+        for name in fast_alone() if self.preset == "paper" else ():
             found = f"{name.replace('_', '-')} with preset paper, which learns its seams, expected preset fast"
             demand(getattr(self, name) == getattr(SeamOptions, name), f"{found}; leave one of the two out")
         counted = self.charts != AUTO or self.preset == "fast"

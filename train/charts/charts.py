@@ -7,7 +7,7 @@ f faces · a part has area 1.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,57 +15,118 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
-from ..carry.arcs import with_straight_arcs
+from ...runtime.progress import Stages
 from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
 from ..carry.straighten import straightened
+from ..finish.energies import finished_by
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
 from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
-from .notes import hurried, notes
-from .objective import objective, rank
-from .parts import Part, split_parts
+from .given import Improved, best_of_copies, given_charts, improvement, no_worse
+from .mirror import mirror_of, mirrored_charts
+from .notes import hurried, kept_isometric, mirror_facts, notes
+from .objective import objective, priced, rank
+from .parts import Part, placed, split_parts
 from .planar import flat_regions, least_seam
 from .proof import all_proven, is_valid
 from .shorten import Page, shortened
 from .slivers import steadied
-from .starts import Starts, best_search
-from .tighten import back_on, is_asked, spent_fine, tightened
+from .starts import NOTHING, Starts, best_search
+from .tighten import back_on, is_asked, settled, tightened
 
 if TYPE_CHECKING:
     from ...runtime.deadline import Late
-    from ...runtime.geometry.cutgraph import SeamPrices
-    from ...runtime.progress import Stages
     from ..config import FinishConfig
     from ..search.search import Search
-    from .starts import Scores
+    from .starts import Known
 
 
 class Finished(NamedTuple):
     """Valid charts in the order of their first face.
 
     pieces: by chart.  objective: what the search lowered.  parts: how many there are, those that are copies of others,
-    and by which way the rest were charted.  notes: sentences on what a user may not expect.
+    and by which way the rest were charted.  notes: sentences on what a user may not expect.  start: what came of an
+    atlas that was given.
     """
 
     pieces: list[Piece]
     objective: float
     parts: dict[str, int]
     notes: tuple[str, ...]
+    start: Improved | None = None
 
 
 class Solved(NamedTuple):
-    """Charts of one part, at area 1, and how they were found: "unfolded" or "searched"."""
+    """Charts of one part, at area 1, and how they were found: "unfolded", "searched", "mirrored" and so on.
+
+    unlike: faces beyond the mirror plane that are no mirror image; None where the part has no such plane.
+    """
 
     pieces: list[Piece]
     way: str
+    unlike: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """What the parts of a surface are charted by; given: atlases to improve, by part."""
+
+    surface: Surface
+    parts: list[Part]
+    charts: int
+    config: FinishConfig
+    seed: int
+    stage: Stages
+    known: Known
+    given: dict[int, Search]
+    late: Late
+
+    def solve(self, number: int) -> Solved:
+        """Charts of a part."""
+        part, config = self.parts[number], self.config
+        part = part._replace(surface=steadied(part.surface, config.sliver))
+        own = priced(config, config.slit.seams.moved(part.origin, part.scale))
+        bound = best_of_copies(self.given, self.parts, number, self.charts)
+        solved = self.mirrored(part, own, bound) if config.symmetry.axis != "none" else self.plain(part, own, bound)
+        if bound is None:
+            return solved
+        return solved._replace(pieces=no_worse(solved.pieces, bound, self.charts, own, self.late))
+
+    def plain(self, part: Part, config: FinishConfig, bound: Search | None) -> Solved:
+        """Charts as they come, those too long for the page cut; bound: an atlas to start from."""
+        total = sum(each.scale**2 for each in self.parts)
+        share, most = part.scale**2 / total, config.closing.charts
+        starts = Starts(part, most, share, config, self.seed, self.known.scores, self.late, bound)
+        solved = solve_part(part.surface, self.charts, starts, config)
+        polygon = None if self.surface.polygon is None else self.surface.polygon[part.ids]
+        page = Page(float(np.sqrt(total)) / part.scale, self.charts, polygon)
+        if config.stretch:
+            return solved
+        return solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
+
+    def mirrored(self, part: Part, config: FinishConfig, bound: Search | None) -> Solved:
+        """Charts that are mirror images, where there is a plane; where that is looked for, if they are no worse."""
+        mirror = mirror_of(part.surface, config.symmetry)
+        if mirror is None:
+            return self.plain(part, config, bound)
+
+        def half(surface: Surface, most: int, own: FinishConfig) -> list[Piece]:
+            return chart_surface(surface, most, own, self.seed, Stages(deadline=self.stage.deadline)).pieces
+
+        pieces = mirrored_charts(part.surface, mirror, self.charts, config, half, self.late)
+        found = Solved(pieces, "mirrored", mirror.unlike)
+        if config.symmetry.axis != "auto":
+            return found
+        ways = [found, self.plain(part, config, bound)._replace(unlike=mirror.unlike)]
+        return min(ways, key=lambda way: rank(way.pieces, part.surface, self.charts, config))
 
 
 def chart_surface(
-    surface: Surface, charts: int, config: FinishConfig, seed: int, stage: Stages, scores: Scores | None = None
+    surface: Surface, charts: int, config: FinishConfig, seed: int, stage: Stages, known: Known = NOTHING
 ) -> Finished:
     """Valid charts of a surface.
 
@@ -76,8 +137,7 @@ def chart_surface(
         seed: of the searches' first labels.
         stage: called with the name of each stage as it begins.  Once its deadline is about to pass, searches end with
             what they have, and it is laid out on the surface in the shortest way.
-        scores: (n, 3) points in the surface's units → (n, k) log chart probabilities, learned elsewhere: the one start
-            of each search.  None starts from geometry.
+        known: what was found elsewhere.
 
     Raises:
         FinishError: the result failed the exact check (a defect).
@@ -87,22 +147,16 @@ def chart_surface(
     total = sum(part.scale**2 for part in parts)
     stage("charts")
     late = partial(stage.deadline.passed, config.haste.seconds + config.haste.seconds_per_face * len(surface.faces))
+    given = given_charts(parts, known.corner_uv, config)
     first = [number for number, part in enumerate(parts) if part.copy_of < 0]
 
-    def solve(number: int) -> Solved:
-        part = parts[number]._replace(surface=steadied(parts[number].surface, config.sliver))
-        own = priced(config, config.slit.seams.moved(part.origin, part.scale))
-        starts = Starts(part, config.closing.charts, part.scale**2 / total, own, seed, scores, late)
-        solved = solve_part(part.surface, charts, starts, own)
-        polygon = None if surface.polygon is None else surface.polygon[part.ids]
-        page = Page(float(np.sqrt(total)) / part.scale, charts, polygon)
-        return solved if config.stretch else solved._replace(pieces=shortened(part.surface, solved.pieces, page, own))
-
+    work = Work(surface, parts, charts, config, seed, stage, known, given, late)
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
     apart = int(2 * len(parts[largest_first[0]].ids) > sum(len(parts[number].ids) for number in first))
     with one_thread_each():
-        found = [solve(number) for number in largest_first[:apart]] + parallel_map(solve, largest_first[apart:])
+        found = [work.solve(number) for number in largest_first[:apart]]
+        found += parallel_map(work.solve, largest_first[apart:])
     solved = dict(zip(largest_first, found, strict=True))
     pieces = [
         placed(piece, part, surface, total)
@@ -112,35 +166,19 @@ def chart_surface(
     stage("exact check")
     pieces = sorted(all_proven(surface, pieces, config.project, late), key=lambda piece: int(piece.ids.min()))
     stage.end()
+    better = improvement(surface, parts, given, pieces, config) if given else None
+    pieces, left = finished_by(pieces, total, config.energy) if not late() else (pieces, 0)
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
-    told = (*hurried(stage.deadline, late), *notes(solved, charts, config))
-    return Finished(pieces, objective(surface, pieces, config.slit.price), facts, told)
-
-
-def priced(config: FinishConfig, seams: SeamPrices) -> FinishConfig:
-    """The same with other prices of seams."""
-    return replace(config, labels=replace(config.labels, seams=seams), slit=replace(config.slit, seams=seams))
-
-
-def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
-    """A chart of a part, or of the one it is a copy of, as a chart of the whole surface."""
-    ids = part.ids[piece.ids]
-    uv, faces = piece.flat.uv * part.scale, piece.flat.surface.faces
-    if part.mirrored:
-        uv, faces = uv * [-1.0, 1.0], faces[:, [0, 2, 1]]
-    vertices = np.zeros((len(uv), 3))
-    corner = faces if not part.mirrored else piece.flat.surface.faces[:, [0, 2, 1]]
-    vertices[corner.reshape(-1)] = surface.vertices[surface.faces[ids]].reshape(-1, 3)
-    share = part.scale**2 / total
-    return replace(
-        piece,
-        ids=ids,
-        flat=Flat(Surface(vertices, faces), uv, {}),
-        energy=piece.energy * share,
-        slit_length=piece.slit_length * float(np.sqrt(share)),
-        slits=(),
+    told = (
+        *hurried(stage.deadline, late),
+        *notes(solved, charts, config),
+        *mirror_facts(solved, config),
+        *kept_isometric(left, config),
+        *(() if better is None else (better.sentence(),)),
     )
+    cost = objective(surface, pieces, config.slit.price)
+    return Finished(pieces, cost, facts, told, better)
 
 
 def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
@@ -189,12 +227,7 @@ def brought_back(
         found = (back_on if asked else carried_back)(middle, coarse, found, charts, config)
     if not late():
         found = straightened(found, config.bands_carried) if coarse is not middle else found
-        found.slit_all(config.slit_above, contacts=True)
-        found.polish()  # so that what an arc seems to gain is not what more steps would have
-        before, found = found, with_straight_arcs(found, config.arcs, late)
-        if found is not before:
-            found.polish()
-        found = spent_fine(found, charts, config, late) if config.stretch else found
+        found = settled(found, charts, config, late)
     found.mend()
     pieces = list(found.pieces.values())
     return pieces if middle is surface else refined(surface, middle, pieces, config, late)

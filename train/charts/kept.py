@@ -17,9 +17,11 @@ from ...runtime.pack.config import IslandConfig
 from ...runtime.pack.exact.seamvertices import split_vertices
 from ...runtime.pack.islands import islands_of
 from ..finish.contact import boundary_edges, excess_energy, rim_overlaps
+from ..finish.energies import finished_by
 from ..finish.pieces import Piece
 from ..finish.slits import Flat
 from .charts import Finished
+from .notes import kept_isometric
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,6 +52,8 @@ def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
         flat = _relaxed(flat, config) if valid else flat
         pieces.append(Piece(ids, flat, excess_energy(flat.surface, flat.uv) / total, 0.0))
     notes = (f"{broken} islands overlap or are turned over in the file and are not relaxed",) if broken else ()
+    pieces, left = finished_by(pieces, total, config.energy)
+    notes += tuple(kept_isometric(left, config))
     return Finished(pieces, sum(piece.energy for piece in pieces), {"kept": len(pieces)}, notes)
 
 

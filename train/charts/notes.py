@@ -54,3 +54,25 @@ def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple
     if resort := resorts["xatlas"]:
         found.append(f"{resort} charts were flattened by xatlas, where our own flattening found nothing valid")
     return tuple(found)
+
+
+def kept_isometric(charts: int, config: FinishConfig) -> Iterator[str]:
+    """What a user has to know of charts that the energy asked for would lay over themselves."""
+    if charts:
+        yield f"{charts} charts would lie over themselves by energy {config.energy.kind}: they are isometric"
+
+
+def mirror_facts(solved: dict[int, Solved], config: FinishConfig) -> Iterator[str]:
+    """What became of mirrored charts, where they are asked for."""
+    axis = config.symmetry.axis
+    if axis == "none":
+        return
+    planes = [part for part in solved.values() if part.unlike is not None]
+    if len(planes) < len(solved):
+        across = "x, y or z" if axis == "auto" else axis
+        yield f"{len(solved) - len(planes)} of {len(solved)} different parts are no mirror image across {across}"
+    unlike = sum(part.unlike or 0 for part in planes)
+    if unlike:
+        yield f"{unlike} faces have no mirror image: seams beside them are as like as the triangles allow"
+    if worse := sum(part.way != "mirrored" for part in planes):
+        yield f"{worse} parts have a mirror plane, but charts that are no mirror images cost less"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ...runtime.geometry.topology import edge_table
 
 if TYPE_CHECKING:
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.mesh import Surface
     from ..config import FinishConfig
     from ..finish.pieces import Piece
@@ -31,3 +33,8 @@ def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfi
     energy = sum(piece.energy for piece in pieces)
     cost = objective(surface, pieces, config.slit.price) - (energy if config.stretch else 0.0)
     return energy > (config.stretch or config.most_excess), len(pieces) > charts, cost
+
+
+def priced(config: FinishConfig, seams: SeamPrices) -> FinishConfig:
+    """The same with other prices of seams."""
+    return replace(config, labels=replace(config.labels, seams=seams), slit=replace(config.slit, seams=seams))

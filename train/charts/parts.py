@@ -6,6 +6,7 @@ another one moved, turned or mirrored is not charted again.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,9 +14,12 @@ import numpy as np
 from ...runtime.geometry.rows import by_first_appearance, first_of_each
 from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices, stable_order
 from ...runtime.mesh import Surface
+from ..finish.slits import Flat
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ..finish.pieces import Piece
 
 
 class Part(NamedTuple):
@@ -109,3 +113,23 @@ def is_copy(first: Part, second: Part, tolerance: float, *, mirrored: bool) -> b
     sign = np.array([1.0, 1.0, (-1.0 if mirrored else 1.0) * np.sign(np.linalg.det(u @ v))])
     gap = np.abs(b @ (u * sign) @ v - a).max(initial=0.0)
     return bool(gap <= tolerance * float(np.ptp(a, axis=0).max(initial=0.0)))
+
+
+def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
+    """A chart of a part, or of the one it is a copy of, as a chart of the whole surface."""
+    ids = part.ids[piece.ids]
+    uv, faces = piece.flat.uv * part.scale, piece.flat.surface.faces
+    if part.mirrored:
+        uv, faces = uv * [-1.0, 1.0], faces[:, [0, 2, 1]]
+    vertices = np.zeros((len(uv), 3))
+    corner = faces if not part.mirrored else piece.flat.surface.faces[:, [0, 2, 1]]
+    vertices[corner.reshape(-1)] = surface.vertices[surface.faces[ids]].reshape(-1, 3)
+    share = part.scale**2 / total
+    return replace(
+        piece,
+        ids=ids,
+        flat=Flat(Surface(vertices, faces), uv, {}),
+        energy=piece.energy * share,
+        slit_length=piece.slit_length * float(np.sqrt(share)),
+        slits=(),
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import compress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..search.labels import dual_graph
 from ..search.search import Search
 from ..search.starts import clusters, pieces_by_score
 from ..workers import parallel_map
+from .given import as_start
 from .objective import rank
 from .proof import is_valid
 
@@ -32,9 +33,26 @@ if TYPE_CHECKING:
     Scores = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
+class Known(NamedTuple):
+    """What was found elsewhere.
+
+    scores: (n, 3) points in the surface's units → (n, k) log chart probabilities: the one start of each search.
+    corner_uv: (f, 3, 2) of an atlas, in any unit: a start beside those from geometry, and no result is worse than it.
+    """
+
+    scores: Scores | None = None
+    corner_uv: NDArray[np.float64] | None = None
+
+
+NOTHING = Known()
+
+
 @dataclass(frozen=True)
 class Starts:
-    """Where the searches of a part begin.  share: of the whole surface's area, which decides how long is searched."""
+    """Where the searches of a part begin.
+
+    share: of the whole surface's area, which decides how long is searched.  given: an atlas of the part, made valid.
+    """
 
     part: Part
     charts: int
@@ -43,6 +61,7 @@ class Starts:
     seed: int
     scores: Scores | None
     late: Late = never
+    given: Search | None = None
 
     @property
     def faces(self) -> int:
@@ -118,6 +137,8 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
         begun += begun_searches(surface, graph, starts, starts.counts)
     if starts.small and min(search.energy() for search in begun) > config.most_excess:
         begun += begun_searches(surface, graph, starts, config.start.counts)
+    if starts.given is not None and len(starts.given.pieces) <= config.start.given:
+        begun.append(laid_out(surface, graph, as_start(starts.given, surface, graph), config).begin(starts.late))
     by_cost = {search.objective(): search for search in begun}  # starts that came to the same are one
     ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
     rounds = config.few_rounds if starts.small else config.rounds

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...runtime.deadline import Late, never
+from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carried_back
 from ..carry.network import network_carried
 from ..seams.closing import Bounds, Closing
+from ..workers import parallel_map
 from .objective import rank
 
 if TYPE_CHECKING:
@@ -51,6 +53,28 @@ def spent_fine(search: Search, charts: int, config: FinishConfig, late: Late = n
     """As `spent`, on the surface itself, in few tries; slits come first where the stretch is too much."""
     opened_up(search, config.stretch, config, late)
     return spent(search, Bounds(charts, config.stretch), config, config.closing.tries_fine, late)
+
+
+def settled(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
+    """The search on the surface itself with slits that pay, straight arcs, and its stretch spent if asked for.
+
+    Under a bound on stretch a slit may be a detour, or the room that two seams are closed in: both ways are gone.
+    """
+    ways = (True, False) if 0.0 < search.energy() <= config.stretch else (True,)
+    found = parallel_map(lambda slits: settled_way(search, charts, config, late, slits=slits), ways)
+    return min(found, key=lambda each: rank(list(each.pieces.values()), each.surface, charts, config))
+
+
+def settled_way(search: Search, charts: int, config: FinishConfig, late: Late, *, slits: bool) -> Search:
+    """As `settled`, with slits or without; the search given stays as it is."""
+    found = search.twin()
+    if slits:
+        found.slit_all(config.slit_above, contacts=True)
+    found.polish()  # so that what an arc seems to gain is not what more steps would have
+    before, found = found, with_straight_arcs(found, config.arcs, late)
+    if found is not before:
+        found.polish()
+    return spent_fine(found, charts, config, late) if config.stretch else found
 
 
 def with_straight_seams(search: Search) -> Search:

@@ -103,6 +103,16 @@ class SlitConfig:
 
 
 @dataclass(frozen=True)
+class EnergyConfig:
+    """What finished charts are laid out by."""
+
+    kind: str = "isometric"
+    """isometric as the search, conformal or arap."""
+    steps: tuple[int, ...] = (40, 12, 3)
+    """SLIM iterations by another energy than the search's; the next where a chart would lie over itself."""
+
+
+@dataclass(frozen=True)
 class ProjectConfig:
     """Charts by projection, where there is no time for a search."""
 

@@ -20,6 +20,7 @@ from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_ar
 from ...runtime.mesh import Charts, Frame, Surface
 from ...runtime.progress import Stages
 from ..charts.charts import chart_surface
+from ..charts.starts import Known
 from ..config import TrainConfig
 from ..deploy.fit import fit_networks
 from ..pipeline import Trained, as_charts
@@ -105,7 +106,7 @@ def finish_learned(
         found = finish_global(ball, uv[:, 0], stage, finishing)
         return found.finished, {**report, "components": found.components}
     report = {"raw": raw_charts(ball, logits, uv)}
-    found = chart_surface(ball, config.charts, finishing.finish, config.seed, stage, lambda xyz: learned(xyz)[0])
+    found = chart_surface(ball, config.charts, finishing.finish, config.seed, stage, Known(lambda xyz: learned(xyz)[0]))
     return found, report
 
 

@@ -65,6 +65,12 @@ class Search(State):
         fresh.pieces, fresh.loose, fresh.tried, fresh.foretold, fresh.settled, fresh._next = {}, [], {}, {}, set(), 0
         return fresh
 
+    def twin(self) -> Self:
+        """The same pieces, to be changed for itself."""
+        other = copy(self)
+        other.pieces, other.tried, other.foretold, other.settled = dict(self.pieces), {}, {}, set()
+        return other
+
     def foretell(self, pair: Pair) -> tuple[float, float]:
         """What curvature foretells of two pieces as one: their cost, and the border that a merge is sure to save."""
         if pair not in self.foretold:

@@ -14,6 +14,8 @@ from scipy.spatial import KDTree
 from ...errors import InputError, MissingFileError
 from ...geometry.cutgraph import path_mask, shortest_paths, trace_back
 from ...geometry.topology import edge_table
+from .facevalues import face_values
+from .sameuv import uv_of_same
 from .shading import ALIKE, shaded
 
 if TYPE_CHECKING:
@@ -28,13 +30,17 @@ UV_ALIKE = 1e-6
 
 
 class WantedSeams(NamedTuple):
-    """cut: (e,) bool, edges that are to be seams.  protected: (n, 3) points, source units, that seams keep away from.
+    """cut: (e,) bool, edges that are to be seams.  protected: (f,) how much seams keep away from a face, 0 to 1.
 
-    Each is None where nothing is asked for.
+    important: (f,) how much a face asks for more texels, 0 to 1.
+
+    start: (f, 3, 2) uv of an atlas to improve.  Each is None where nothing is asked for.
     """
 
     cut: NDArray[np.bool_] | None = None
     protected: NDArray[np.float64] | None = None
+    important: NDArray[np.float64] | None = None
+    start: NDArray[np.float64] | None = None
 
 
 NO_WISH = WantedSeams()
@@ -45,10 +51,11 @@ def wanted_seams(asset: Asset, options: SeamOptions, crease_angle: float) -> Wan
 
     Args:
         asset: the mesh as it was read, or shaded.
-        options: which borders stay, a file of cuts, and one of points to keep away from.
+        options: which borders stay, a file of cuts, what to keep away from and what is important, and an atlas.
         crease_angle: degrees above which an edge is hard, where the file has neither normals nor smoothing groups.
 
-    Raises: InputError for uv that the mesh does not have, or a file of cuts that is none; MissingFileError.
+    Raises: InputError for uv that the mesh does not have, a file of cuts that is none, or an atlas of another mesh;
+    MissingFileError.
     """
     table = edge_table(asset.surface.faces)
     found = np.zeros(len(table.edges), dtype=bool)
@@ -56,8 +63,11 @@ def wanted_seams(asset: Asset, options: SeamOptions, crease_angle: float) -> Wan
         found |= torn(table, values_of(asset, name, crease_angle), UV_ALIKE if name == "uv" else ALIKE)
     if options.cut is not None:
         found |= cuts_of(asset, table, Path(options.cut))
-    protected = None if options.protect is None else read_protected(Path(options.protect))
-    return WantedSeams(found if options.kept or options.cut is not None else None, protected)
+    protected, important = (
+        None if source is None else face_values(asset, Path(source)) for source in (options.protect, options.importance)
+    )
+    start = None if options.start is None else uv_of_same(asset, Path(options.start))
+    return WantedSeams(found if options.kept or options.cut is not None else None, protected, important, start)
 
 
 def values_of(asset: Asset, name: str, crease_angle: float) -> NDArray[np.float64]:
@@ -97,19 +107,6 @@ def cuts_of(asset: Asset, table: EdgeTable, path: Path) -> NDArray[np.bool_]:
             raise InputError(f"{path} has a cut that joins no two vertices of one part; correct its points")
         ways.append(trace_back(tree.parent, end))
     return path_mask(table, ways)
-
-
-def read_protected(path: Path) -> NDArray[np.float64]:
-    """(n, 3) the points of a .npy file.  Raises: InputError, MissingFileError."""
-    if not path.is_file():
-        raise MissingFileError(f"{path} is no file, expected a .npy file of points (n, 3); correct it")
-    try:
-        points = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise InputError(f"{path} can't be read ({error}), expected a .npy file of points (n, 3)") from error
-    if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf" or not np.isfinite(points).all():
-        raise InputError(f"{path} holds {points.dtype} {points.shape}, expected finite points (n, 3); save those")
-    return points.astype(np.float64)
 
 
 def read_cuts(path: Path) -> NDArray[np.float64]:

@@ -98,6 +98,7 @@ def _asset(raw: RawMesh, sheets: NDArray[np.int64], *, stem: str, sha256: str) -
         polygons=part.polygons,
         obj=part.obj,
         smoothing=part.smoothing,
+        stored=part.stored,
     )
 
 

@@ -16,7 +16,7 @@ from scipy.special import expit
 
 from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
-from ...mesh import Polygons
+from ...mesh import Polygons, Stored
 from ..pictures.colors import as_rgba
 from ..pictures.pictures import decode_image, is_deep
 from ..polygons import Triangles, strip_triangles, triangles_of
@@ -37,6 +37,8 @@ HARMONIC = 0.5 / math.sqrt(math.pi)
 """Value of the constant spherical harmonic."""
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 CORNERS = ("vertex_indices", "vertex_index")
+USED = {*("x", "y", "z", "nx", "ny", "nz"), *COLORS, *(f"diffuse_{name}" for name in COLORS), *sum(UV_NAMES, ())}
+"""Properties of vertices that a mesh is made of."""
 
 
 def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMesh:
@@ -67,6 +69,7 @@ def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
         colors=colors,
         uv=uv,
         changes=left_out(header),
+        stored=_stored(vertices, positions),
     )
     if "tristrips" in tables:
         return replace(raw, faces=_strips(tables["tristrips"], len(positions)))
@@ -102,6 +105,13 @@ def _group(table: Table, names: tuple[str, ...]) -> NDArray[np.float64] | None:
     if any(column is None or isinstance(column, Lists) for column in columns):
         return None
     return np.stack([to_float64(np.asarray(column)) for column in columns], axis=1)
+
+
+def _stored(table: Table, positions: NDArray[np.float64]) -> Stored | None:
+    """Numbers that the mesh itself has no use for, by the names of their properties."""
+    values = {name: np.asarray(column) for name, column in table.items() if not isinstance(column, Lists)}
+    own = {name: column for name, column in values.items() if name not in USED and column.dtype.kind in "iuf"}
+    return Stored(positions, own) if own else None
 
 
 def _colors(table: Table) -> NDArray[np.uint8] | None:

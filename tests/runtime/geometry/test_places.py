@@ -36,14 +36,14 @@ def test_the_inner_side_of_a_torus_is_hidden_and_cheaper_than_the_outer_one() ->
     assert price[away < np.quantile(away, 0.1)].mean() < 0.7 * price[away > np.quantile(away, 0.9)].mean()
 
 
-def test_places_near_protected_points_are_dear_and_all_others_as_before() -> None:
+def test_protected_faces_are_as_dear_as_they_are_protected_and_all_others_as_before() -> None:
     ball = sample("sphere", 32)
     pole = ball.vertices[ball.vertices[:, 2].argmax()]
-    places = priced_places(ball, PlaceConfig(near=0.1), pole[None])
     middle = ball.triangles.mean(axis=1)
-    near = np.linalg.norm(middle - pole, axis=1) <= 0.1 * np.ptp(ball.vertices, axis=0).max()
+    near = np.clip(1.0 - np.linalg.norm(middle - pole, axis=1), 0.0, 1.0)
+    places = priced_places(ball, PlaceConfig(), near)
     assert near.any()
-    assert np.array_equal(places.at(middle), np.where(near, 10.0, 1.0))
+    assert np.allclose(places.at(middle), 1.0 + 9.0 * near)
 
 
 def test_moved_places_answer_alike_in_the_other_frame() -> None:

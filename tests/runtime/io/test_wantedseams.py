@@ -10,7 +10,7 @@ import pytest
 
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.geometry.topology import edge_table
-from flexpara.runtime.io.asset.wantedseams import NO_WISH, WantedSeams, read_cuts, read_protected, wanted_seams
+from flexpara.runtime.io.asset.wantedseams import NO_WISH, WantedSeams, read_cuts, wanted_seams
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.mesh import Asset
 from flexpara.runtime.options.seams import SeamOptions
@@ -100,20 +100,3 @@ def test_a_missing_file_and_a_cut_without_length_are_refused(tmp_path: Path) -> 
     file.write_text("0 0 0 0 0 0\n", encoding="utf-8")
     with pytest.raises(InputError, match="joins no two"):
         wanted_seams(two_squares(), SeamOptions(cut=file), ANGLE)
-
-
-def test_protected_points_are_read_and_anything_else_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "points.npy"
-    np.save(file, np.eye(3, dtype=np.float32))
-    found = wanted_seams(two_squares(), SeamOptions(protect=file), ANGLE)
-    assert found.cut is None
-    assert np.array_equal(np.asarray(found.protected), np.eye(3))
-    for wrong in (np.zeros((2, 2)), np.full((1, 3), np.nan), np.array([["a", "b", "c"]])):
-        np.save(file, wrong)
-        with pytest.raises(InputError, match="finite points"):
-            read_protected(file)
-    file.write_bytes(b"no array")
-    with pytest.raises(InputError, match="can't be read"):
-        read_protected(file)
-    with pytest.raises(MissingFileError, match=r"\.npy"):
-        read_protected(tmp_path / "none.npy")

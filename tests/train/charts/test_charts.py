@@ -22,6 +22,7 @@ from flexpara.train.charts import charts as module
 from flexpara.train.charts.charts import Finished, chart_surface
 from flexpara.train.charts.objective import objective
 from flexpara.train.charts.proof import verify
+from flexpara.train.charts.starts import Known
 from flexpara.train.config import FinishConfig, StartConfig
 from flexpara.train.finish.flatten import jacobians
 from flexpara.train.search.search import Search
@@ -200,7 +201,7 @@ def test_learned_scores_take_the_place_of_geometry() -> None:
         return -np.logaddexp(0.0, np.array([-9.0, 9.0]) * (points[:, 2:] - 50.0))
 
     curved = replace(CONFIG, planar=replace(CONFIG.planar, most=0))  # no unfolding is tried
-    found = chart_surface(ball, 2, curved, 0, Stages(), scores)
+    found = chart_surface(ball, 2, curved, 0, Stages(), Known(scores))
     assert_valid(found, ball)
     assert len(asked) == 1
     np.testing.assert_allclose(asked[0], ball.triangles.mean(axis=1), atol=1e-9)

@@ -1,0 +1,59 @@
+"""Charts finished by another energy than the search's: angles alone, or rigidity.   A chart that would overlap stays.
+
+isometric: symmetric Dirichlet, σ² + 1/σ² · conformal: (σ₁² + σ₂²) / 2σ₁σ₂, each chart then at the area of its surface ·
+arap: Σ (σ − 1)², for the singular values σ of a face's derivative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import igl
+import numpy as np
+
+from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.triangles import signed_areas
+from ..workers import parallel_map
+from .contact import boundary_edges, excess_energy, rim_overlaps
+from .flatten import slim
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ...runtime.mesh import Surface
+    from .config import EnergyConfig
+    from .pieces import Piece
+
+KINDS = {"conformal": igl.MappingEnergyType.CONFORMAL, "arap": igl.MappingEnergyType.ARAP}
+
+
+def finished_by(pieces: list[Piece], total_area: float, config: EnergyConfig) -> tuple[list[Piece], int]:
+    """The charts by the energy asked for, and how many stay by the search's, since they would lie over themselves."""
+    if config.kind not in KINDS:
+        return pieces, 0
+    found = parallel_map(lambda piece: by_energy(piece, total_area, config), pieces)
+    return [new or old for new, old in zip(found, pieces, strict=True)], sum(new is None for new in found)
+
+
+def by_energy(piece: Piece, total_area: float, config: EnergyConfig) -> Piece | None:
+    """The chart after as many steps of SLIM by that energy as leave it valid; None where not even few do."""
+    surface = piece.flat.surface
+    for steps in config.steps:
+        uv = at_own_area(surface, slim(surface, piece.flat.uv, steps, energy=KINDS[config.kind]))
+        if is_valid(surface, uv):
+            energy = excess_energy(surface, uv) / total_area
+            return replace(piece, flat=piece.flat._replace(uv=uv), energy=energy)
+    return None
+
+
+def at_own_area(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Uv (v, 2) at the area of the surface."""
+    area = float(signed_areas(uv[surface.faces]).sum())
+    return uv * np.sqrt(float(surface.face_areas().sum()) / area) if area > 0.0 else uv
+
+
+def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
+    """True for finite uv (v, 2) without flips, whose border does not cross itself."""
+    flipped = not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any()
+    return not flipped and not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)
