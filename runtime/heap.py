@@ -23,7 +23,7 @@ class Kept:
 
     free: int = 256 << 20
     pad: int = 64 << 20
-    mapped: int = 1 << 30
+    mapped: int = 64 << 20
 
 
 def keep_freed_memory(kept: Kept = Kept()) -> bool:
