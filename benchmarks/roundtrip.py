@@ -27,8 +27,10 @@ FOLDERS = ("scenes", "files", "simple")
 CORPUS = ROOT.parent / "shared" / "corpus"
 LIMIT = 300.0
 """Seconds that one program may take on one file."""
-KEPT = {".obj": "obj", ".ply": "ply"}
-"""Format that a file of such an ending comes back in; glb for all others."""
+KEPT = {".obj": "obj", ".ply": "ply", ".stl": "ply"}
+"""Format that a file of such an ending comes back in; glb for all others.
+
+Not for STL: Blender takes its z as up, and of glTF y, so the same numbers stand turned there."""
 
 
 @dataclass(frozen=True)
