@@ -56,9 +56,9 @@ def glb_bytes(
 ) -> bytes:
     """The bytes of a .glb file; same arguments, same bytes.
 
-    What the maps become is said in gltfmaterial.py; the map `normal` brings TANGENT along.  A bare closed mesh gets no
-    material.  TEXCOORD_1 is the source's own uv.  Vertex colours are COLOR_0 without a base colour texture and
-    _COLOR_0 beside one, since COLOR_0 would be multiplied into the texture.
+    What the maps become is said in gltfmaterial.py; the map `normal` brings TANGENT along.  A bare mesh gets a material
+    too, since trimesh reads no uv without one.  TEXCOORD_1 is the source's own uv.  Vertex colours are COLOR_0 without a
+    base colour texture and _COLOR_0 beside one, since COLOR_0 would be multiplied into the texture.
 
     Args:
         atlas: what is written.
@@ -75,19 +75,11 @@ def glb_bytes(
     if metadata:
         document.asset.extras = {"flexpara": json.loads(json.dumps(metadata))}
     material = add_material(document, buffer, asset, textures)
-    if says_nothing(document, asset, material):
-        document.materials = []
     _add_mesh(document, buffer, atlas, asset, material)
     document.accessors, document.bufferViews = buffer.accessors, buffer.views
     document.buffers = [gl.Buffer(byteLength=len(buffer.data))]
     document.set_binary_blob(bytes(buffer.data))
     return b"".join(document.save_to_bytes())
-
-
-def says_nothing(document: gl.GLTF2, asset: Asset, material: gl.Material) -> bool:
-    """Whether a mesh that came without a material needs none: no texture, no colours, nothing to see from behind."""
-    shown = bool(document.textures) or asset.colors is not None or bool(material.doubleSided)
-    return not asset.materials and not shown
 
 
 def _check(atlas: Atlas, asset: Asset) -> None:
@@ -114,9 +106,7 @@ def _add_mesh(document: gl.GLTF2, buffer: Buffer, atlas: Atlas, asset: Asset, ma
         name: buffer.accessor(array, gl.ARRAY_BUFFER, bounds=name == "POSITION") for name, array in arrays.items()
     }
     indices = buffer.accessor(_indices(atlas), gl.ELEMENT_ARRAY_BUFFER)
-    primitive = gl.Primitive(
-        attributes=gl.Attributes(**numbers), indices=indices, material=0 if document.materials else None
-    )
+    primitive = gl.Primitive(attributes=gl.Attributes(**numbers), indices=indices, material=0)
     document.meshes = [gl.Mesh(name=asset.stem, primitives=[primitive])]
     translation = centre.tolist() if centre.any() else None
     document.nodes = [gl.Node(name=asset.stem, mesh=0, translation=translation)]

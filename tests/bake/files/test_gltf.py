@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pygltflib
 import pytest
+import trimesh
+from trimesh.visual import TextureVisuals
 
 from flexpara.bake.baker import bake
 from flexpara.bake.files.gltf import glb_bytes, write_glb
 from flexpara.bake.files.images import quantize, read_image
 from flexpara.bake.maps.tangents import vertex_tangents
-from flexpara.bake.texture import Texture
 from flexpara.runtime.errors import ShapeError
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.material import SLOTS, Material, Picture
@@ -198,12 +199,12 @@ def test_an_open_surface_is_seen_from_both_sides(quad: Pair, closed: Pair) -> No
     assert parse(glb_bytes(*painted, {})).materials[0].doubleSided is False
 
 
-def test_a_bare_closed_mesh_gains_no_material(closed: Pair) -> None:
-    document = parse(glb_bytes(*closed, {}))
-    assert document.materials == []
-    assert document.meshes[0].primitives[0].material is None
-    white = {"base-color": Texture(np.ones((4, 4, 3), np.float32), "srgb", 8, "png")}
-    assert len(parse(glb_bytes(*closed, white)).materials) == 1
+def test_a_bare_mesh_has_uv_for_readers_that_find_them_by_material(closed: Pair, tmp_path: Path) -> None:
+    write_glb(*closed, {}, tmp_path / "bare.glb")
+    read = trimesh.load(tmp_path / "bare.glb", force="mesh", process=False)
+    assert isinstance(read, trimesh.Trimesh)
+    assert isinstance(read.visual, TextureVisuals)
+    np.testing.assert_allclose(np.asarray(read.visual.uv), closed[0].uv, atol=1e-6)
 
 
 def test_metadata_travels_in_the_extras(quad: Pair) -> None:
