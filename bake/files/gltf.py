@@ -57,8 +57,8 @@ def glb_bytes(
     """The bytes of a .glb file; same arguments, same bytes.
 
     What the maps become is said in gltfmaterial.py; the map `normal` brings TANGENT along.  A bare mesh gets a material
-    too, since trimesh reads no uv without one.  TEXCOORD_1 is the source's own uv.  Vertex colours are COLOR_0 without a
-    base colour texture and _COLOR_0 beside one, since COLOR_0 would be multiplied into the texture.
+    too, since trimesh reads no uv without one.  TEXCOORD_1 is the source's own uv.  Vertex colours are COLOR_0 without
+    a base colour texture and _COLOR_0 beside one, since COLOR_0 would be multiplied into the texture.
 
     Args:
         atlas: what is written.
