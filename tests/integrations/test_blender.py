@@ -157,6 +157,16 @@ def test_the_bar_grows_from_stage_to_stage_without_a_gap() -> None:
     assert child.stage_of("normal", 1, 4) == ("normal", 0.25)
 
 
+def test_the_bar_knows_the_stages_of_an_unwrap_in_their_order(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], house: Any
+) -> None:
+    exchange.write_ply(house, tmp_path / "house.ply")
+    words = ["unwrap", str(tmp_path / "house.ply"), "-o", str(tmp_path / "out"), "--maps", "none", "--format", "npz"]
+    assert main([*words, "--size", "64", "--progress-lines"]) == 0
+    found = [child.PROGRESS.match(line) for line in capsys.readouterr().err.splitlines()]
+    assert list(dict.fromkeys(each[1] for each in found if each)) == list(child.SPANS)
+
+
 def test_a_program_that_is_not_there_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     with pytest.raises(child.FlexparaError, match="not found on PATH: install it"):
