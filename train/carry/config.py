@@ -57,6 +57,8 @@ class FineConfig:
     """A chart that loses so many scraps, or more, is flattened anew …"""
     anew: int = 40_000
     """… where it has no more faces than this."""
+    largest: int = 150_000
+    """Faces above which a chart that is valid is not flattened anew for its stretch either: it would take minutes."""
     above: float = 1.5
     """Parts of more than so many times as many are thinned."""
     early: int = 3

@@ -77,7 +77,7 @@ def refined_piece(
 ) -> list[Piece]:
     """The faces of a group laid out like their source, and what had to be cut off; empty where no way to is valid.
 
-    It may be no worse than the source by more than the configured factor, unless it is ``late``.
+    It may be no worse than the source by more than the configured factor, unless it is ``late``, or too large for SLIM.
     """
     if late():
         config = replace(config, fine=config.fine.in_a_hurry())
@@ -93,7 +93,8 @@ def refined_piece(
         if best and (best[0].energy <= allowed or late()):
             break
     torn = len(best) > config.fine.scraps and len(ids) <= config.fine.anew
-    if not best or ((torn or best[0].energy > allowed) and not late()):
+    dear = bool(best) and best[0].energy > allowed and len(ids) <= config.fine.largest
+    if not best or ((torn or dear) and not late()):
         return []
     return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]
 

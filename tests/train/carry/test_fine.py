@@ -116,6 +116,17 @@ def test_late_a_layout_worse_than_its_source_is_kept(
         refined(surface, middle, halves(middle), demanding)
 
 
+def test_a_valid_layout_of_very_many_faces_is_kept_though_it_stretches_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = unit("sphere", 64)
+    middle = thinned(surface, MIDDLE)
+    demanding = replace(CONFIG, carry=replace(CONFIG.carry, worse=0.0, slack=0.0))
+    monkeypatch.setattr(fine, "State", None)  # flattening anew would need it
+    found = refined(surface, middle, halves(middle), replace(demanding, fine=replace(demanding.fine, largest=0)))
+    assert len(found) == 2
+    for piece in found:
+        assert_valid(piece)
+
+
 def test_late_what_can_not_be_laid_out_is_projected(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = unit("sphere", 64)
     middle = thinned(surface, MIDDLE)
