@@ -14,6 +14,8 @@ import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual import TextureVisuals
 
 from flexpara.bake.baker import bake
 from flexpara.bake.files.gltfscene import Page, write_scene
@@ -181,12 +183,14 @@ def test_without_maps_the_materials_keep_their_pictures_on_the_old_uv(source: Pa
 def test_a_primitive_without_material_gets_one_without_which_trimesh_passes_over_its_uv(tmp_path: Path) -> None:
     source = tmp_path / "plain.glb"
     triangle = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
-    source.write_bytes(trimesh.exchange.gltf.export_glb(trimesh.Scene(triangle), include_normals=True))
+    source.write_bytes(export_glb(trimesh.Scene(triangle), include_normals=True))
     assert "materials" not in tree_of(source)
     path = rewritten(source)
     assert tree_of(path)["materials"] == [{"name": "material"}]  # no property: as glTF draws what has no material
-    (read,) = trimesh.load(path, process=False).geometry.values()
-    assert read.visual.uv.shape == (3, 2)
+    read = trimesh.load(path, process=False, force="mesh")
+    assert isinstance(read, trimesh.Trimesh)
+    assert isinstance(read.visual, TextureVisuals)
+    assert np.shape(read.visual.uv) == (3, 2)
     assert_valid(path)
 
 
