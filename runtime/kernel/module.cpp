@@ -289,7 +289,7 @@ static void define_clouds(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 3;
+    module.attr("edition") = 4;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);

@@ -5,6 +5,8 @@
 // a sweep backward.  Its twin's has no sweeps and takes several times as many steps to the same residual.
 // Unknowns are numbered anew, neighbours near each other, and parted in blocks.  A sweep sees within its block what it
 // has just changed, and of others what was there before: blocks are swept, and all else is done, by several threads.
+// Sweeps divide by the diagonal and what links a row to other blocks, without which the preconditioner may be indefinite
+// (Baker, Falgout, Kolev, Yang, Multigrid Smoothers for Ultraparallel Computing, 2011).
 #pragma once
 
 #include "cholesky.hpp"
@@ -81,7 +83,7 @@ class TwoLevel {
     // coarse: Pᵀ A P.
     TwoLevel(const Rows& matrix, const Rows& weights, const Rows& coarse, double tolerance, int most, int threads)
         : order_(ring_order(matrix)), small_(coarse.size(), links(coarse)), tolerance_(tolerance), most_(most),
-          threads_(threads), diagonal_(matrix.size(), 1.0) {
+          threads_(threads), diagonal_(matrix.size(), 0.0) {
         std::vector<int> place(order_.size());
         for (std::size_t i = 0; i < order_.size(); ++i) place[order_[i]] = int(i);
         a_ = reordered(matrix, order_, place);
@@ -89,7 +91,8 @@ class TwoLevel {
         back_ = transposed(p_, coarse.size());
         for (int i = 0; i < a_.size(); ++i)
             for (int at = a_.begin[i]; at < a_.begin[i + 1]; ++at)
-                if (a_.column[at] == i) diagonal_[i] = a_.value[at];
+                if (a_.column[at] == i) diagonal_[i] += a_.value[at];
+                else if (a_.column[at] / kBlock != i / kBlock) diagonal_[i] += std::abs(a_.value[at]);
         small_.clear();
         for (int i = 0; i < coarse.size(); ++i) {
             for (int at = coarse.begin[i]; at < coarse.begin[i + 1]; ++at)

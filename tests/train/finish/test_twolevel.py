@@ -94,3 +94,17 @@ def test_threads_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
         found.append(TwoLevel(matrix, hats(count, 8)[:, :-1], 1e-6, 50).solve(right, None, 1.0))
     assert np.array_equal(found[0], found[1])
     assert np.array_equal(found[0], found[2])
+
+
+def test_rows_that_pull_at_others_of_another_block_do_not_end_it() -> None:
+    """Slivers link rows by weights of either sign: a hub, 18,000 rows around it, and in each triangle a row beyond."""
+    count = 9_000
+    pair, beyond = 1 + np.arange(2 * count), 1 + 2 * count + np.arange(count)
+    rows = np.concatenate([np.zeros(2 * count, np.int64), pair[::2], pair[::2], pair[1::2]])
+    columns = np.concatenate([pair, pair[1::2], beyond, beyond])
+    value = np.concatenate([np.full(2 * count, -1e-6), np.full(3 * count, 0.9)])
+    upper = sparse.csr_array((value, (rows, columns)), shape=(3 * count + 1, 3 * count + 1))
+    matrix = sparse.csr_array(upper + upper.T + sparse.eye_array(3 * count + 1))
+    right = np.random.default_rng(5).normal(size=(3 * count + 1, 2))
+    found = TwoLevel(matrix, sparse.csr_array(np.ones((3 * count + 1, 1))), 1e-10, 500).solve(right, None, 1.0)
+    assert np.linalg.norm(right - matrix @ found) <= 1e-9
