@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...runtime.geometry.cutgraph import cut_chains
-from ...runtime.geometry.topology import boundary_loops, components, edge_table, euler_characteristic
+from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic, face_components
 from ...runtime.mesh import Surface
 from .disks import cut_open, disk_cuts, edge_costs, path_mask, shortest_paths, trace_back
 from .slits import Slit
@@ -54,26 +54,28 @@ def slit_along(surface: Surface, slits: tuple[Slit, ...], config: SlitConfig) ->
     if not slits:
         return surface
     table = edge_table(surface.faces)
-    work = Slitting(surface, np.zeros(len(surface.vertices), dtype=bool))
+    work = Slitting(surface, np.zeros(len(surface.vertices), dtype=bool), np.arange(len(surface.vertices)))
     work.border[table.edges[table.edge_count == 1]] = True
+    joined = table.manifold.copy()
     for slit in slits:
         path = path_along(work, slit, config)
         if len(path) < 2:
             continue
-        trial = work.cut(path)
-        if not slit.through or not components(trial.surface.faces).any():
-            work = trial
+        left = joined & ~path_mask(table, [work.source[path].tolist()])
+        if not slit.through or not face_components(len(surface.faces), table.edge_faces[left]).any():
+            work, joined = work.cut(path), left
     return work.surface
 
 
 class Slitting(NamedTuple):
-    """A piece on its way to be slit.  border: (v,) bool, vertices on it.
+    """A piece on its way to be slit.  border: (v,) bool, vertices on it.  source: (v,) those of the piece as it was.
 
     On a fine mesh a slit is short: what does not lie near it is only numbered anew.
     """
 
     surface: Surface
     border: NDArray[np.bool_]
+    source: NDArray[np.int64]
 
     def around(self, slit: Slit, reach: float) -> NDArray[np.int64]:
         """Faces with a corner in the box around a slit, so far wider on all sides."""
@@ -105,21 +107,33 @@ class Slitting(NamedTuple):
         border, table = self.border[source], edge_table(faces[rows])
         rim = table.edges[table.edge_count == 1]
         border[rim[on_path[source[rim]].any(axis=1)]] = True
-        return Slitting(Surface(self.surface.vertices[source], faces), border)
+        return Slitting(Surface(self.surface.vertices[source], faces), border, self.source[source])
 
 
 def path_along(work: Slitting, slit: Slit, config: SlitConfig) -> list[int]:
     """The cheapest way between a slit's ends, from the inner one to the border; fewer than two vertices for none."""
-    for reach in (config.reach * slit.step, np.inf):
+    for reach in (config.astray * slit.step, config.reach * slit.step, np.inf):
         rows = work.around(slit, reach)
         vertex, index = np.unique(work.surface.faces[rows], return_inverse=True)
+        near = Surface(work.surface.vertices[vertex], index.reshape(-1, 3))
         border = np.flatnonzero(work.border[vertex])
-        if len(border) or (len(rows) and not work.border.any()):
-            near = Surface(work.surface.vertices[vertex], index.reshape(-1, 3))
-            path = way_along(near, border, slit, config)
-            if len(path) > 1:
-                return vertex[path].tolist()
+        # a vertex near enough to an end would be among these
+        if (work.border.any() and not len(border)) or is_astray(near, border, slit, config):
+            return []
+        path = way_along(near, border, slit, config)
+        if len(path) > 1:
+            return vertex[path].tolist()
     return []
+
+
+def is_astray(surface: Surface, border: NDArray[np.int64], slit: Slit, config: SlitConfig) -> bool:
+    """Whether an end of a slit is far from all vertices that it could be at."""
+    points = surface.vertices
+    beginnings = points[border] if len(border) else points
+    ends = (beginnings, slit.points[0]), (points, slit.points[-1])
+    return any(
+        not len(near) or np.linalg.norm(near - end, axis=1).min() > config.astray * slit.step for near, end in ends
+    )
 
 
 def way_along(surface: Surface, border: NDArray[np.int64], slit: Slit, config: SlitConfig) -> list[int]:
@@ -128,8 +142,6 @@ def way_along(surface: Surface, border: NDArray[np.int64], slit: Slit, config: S
     begin = np.linalg.norm(points - slit.points[0], axis=1)
     end = np.linalg.norm(points - slit.points[-1], axis=1)
     beginnings = border if len(border) else np.arange(len(points))
-    if max(begin[beginnings].min(), end.min()) > config.astray * slit.step:
-        return []
     # where an earlier slit passes, both of its sides are as near: the cheaper way starts on the right one
     sources = beginnings[begin[beginnings] <= begin[beginnings].min()]
     cost = edge_costs(surface, table, config.seams) * detour(points[table.edges], slit)
