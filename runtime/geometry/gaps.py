@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MOST_SAMPLES = 400_000
+_CELLS = 8
+"""Squares to the distance up to which segments are looked for: those of far squares are not compared one by one."""
+_BLOCK = 2_000_000
+"""Pairs of samples compared at a time."""
 _COARSE = 4
 """Spacings from one sample to the next where pairs that may be the closest are looked for."""
 _REACHES = (1.0, 3.0, 9.0, 27.0)
@@ -39,7 +43,9 @@ def smallest_chart_gap(segments: NDArray[np.float64], chart: NDArray[np.int64], 
     if not has_gaps(segments, chart):
         return None
     points, owner, coarse = _samples(segments, _COARSE * spacing)
-    reach = _gap_of_points(points, chart[owner], coarse)
+    row, start, _ = _cells(points, chart[owner], coarse / 2.0)
+    some = row[start[:-1]]
+    reach = _gap_of_points(points[some], chart[owner[some]], coarse)
     if reach is None:
         pairs = facing_segments(segments, chart, spacing=spacing, reach=2.0 * spacing)
     else:
@@ -115,11 +121,43 @@ def near_segments(
     Returns:
         (p, 2) int64 segment indices.
     """
-    points, owner, spacing = _samples(segments, spacing)
-    pairs = KDTree(points).query_pairs(reach + spacing, output_type="ndarray")
-    pairs = owner[pairs.astype(np.int64).reshape(-1, 2)]
-    pairs = np.sort(pairs[chart[pairs[:, 0]] != chart[pairs[:, 1]]], axis=1)
-    return np.unique(pairs, axis=0)
+    points, owner, _ = _samples(segments, spacing)
+    step = np.linalg.norm(points[1:] - points[:-1], axis=1)[owner[1:] == owner[:-1]].max(initial=0.0)
+    radius = reach + float(step)
+    cell = radius / _CELLS
+    row, start, centre = _cells(points, chart[owner], cell)
+    size = np.diff(start)
+    one, other = KDTree(centre).query_pairs(radius + np.sqrt(2.0) * cell, output_type="ndarray").T
+    across = chart[owner[row[start[one]]]] != chart[owner[row[start[other]]]]
+    one, other = one[across].astype(np.int64), other[across].astype(np.int64)
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for block in np.array_split(np.arange(len(one)), max(int((size[one] * size[other]).sum()) // _BLOCK, 1)):
+        count = size[other[block]]
+        pair = np.repeat(np.arange(len(block)), size[one[block]] * count)
+        index = np.arange(len(pair)) - np.searchsorted(pair, pair)
+        first = row[start[one[block]][pair] + index // count[pair]]
+        second = row[start[other[block]][pair] + index % count[pair]]
+        near = ((points[first] - points[second]) ** 2).sum(axis=1) <= radius**2
+        both = np.sort(np.stack([owner[first[near]], owner[second[near]]], axis=1), axis=1)
+        found.append(np.unique(both, axis=0))
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def spread(segments: NDArray[np.float64], chart: NDArray[np.int64], *, cell: float) -> NDArray[np.int64]:
+    """(r,) rows of the segments (s, 2, 2), one for each chart and each square of so many uv units that it passes."""
+    row, start, _ = _cells(segments.mean(axis=1), chart, cell)
+    return np.sort(row[start[:-1]])
+
+
+def _cells(
+    points: NDArray[np.float64], chart: NDArray[np.int64], cell: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Points (n, 2) by chart (n,) and square: rows (n,), where each square's begin (c + 1,), its centre (c, 2)."""
+    place = np.floor(points / cell).astype(np.int64)
+    row = np.lexsort((place[:, 1], place[:, 0], chart))
+    key = np.column_stack([chart, place])[row]
+    begins = np.flatnonzero(np.append(True, (key[1:] != key[:-1]).any(axis=1)))
+    return row, np.append(begins, len(row)), (key[begins, 1:] + 0.5) * cell
 
 
 def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FinishError
-from ...geometry.gaps import near_segments, segment_distance
+from ...geometry.gaps import near_segments, segment_distance, spread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +50,9 @@ def padded(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> C
     room = np.minimum(crowd.centre, crowd.extent - crowd.centre) - border
     walls = float((room / np.maximum(crowd.half, 1e-300)).min())
     spacing = max(config.sample / 2.0, apart / 2.0)
-    pairs = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart + spacing)
+    segments = crowd.segments()
+    some = spread(segments, crowd.chart, cell=spacing / 4.0)  # the repairs find what these leave out
+    pairs = some[near_segments(segments[some], crowd.chart[some], spacing=spacing, reach=apart + spacing)]
     for _ in range(config.repairs):
         crowd = replace(crowd, factor=largest_factor(crowd, pairs, apart, walls))
         closest = near_segments(crowd.segments(), crowd.chart, spacing=spacing, reach=apart)
