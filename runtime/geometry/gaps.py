@@ -157,7 +157,7 @@ def _cells(
     row = np.lexsort((place[:, 1], place[:, 0], chart))
     key = np.column_stack([chart, place])[row]
     begins = np.flatnonzero(np.append(True, (key[1:] != key[:-1]).any(axis=1)))
-    return row, np.append(begins, len(row)), (key[begins, 1:] + 0.5) * cell
+    return row, np.append(begins, len(row)), (key[begins, 1:].astype(np.float64) + 0.5) * cell
 
 
 def segment_distance(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from flexpara.runtime.geometry.gaps import (
     sample_segments,
     segment_distance,
     smallest_chart_gap,
+    spread,
 )
 
 if TYPE_CHECKING:
@@ -72,6 +73,28 @@ def test_random_rectangles_agree_with_all_pairs(seed: int) -> None:
     close = segment_distance(segments[i], segments[j]) <= 0.2
     assert near >= set(zip(i[close].tolist(), j[close].tolist(), strict=True))
     assert all(chart[one] != chart[other] for one, other in near)
+
+
+def test_outlines_of_thousands_of_short_segments_have_the_pairs_of_all_with_all() -> None:
+    """Two rings of radius 1, 0.1 apart: only what faces the other ring is near it."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 3001)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    one = np.stack([ring[:-1], ring[1:]], axis=1)
+    segments, chart = np.concatenate([one, one + [2.1, 0.0]]), np.repeat([0, 1], 3000)
+    pairs = near_segments(segments, chart, spacing=0.05, reach=0.15)
+    i, j = (rows.reshape(-1) for rows in np.meshgrid(np.arange(3000), 3000 + np.arange(3000), indexing="ij"))
+    facing = np.linalg.norm(segments[i, 0] - segments[j, 0], axis=1) < 0.2
+    i, j = i[facing], j[facing]
+    close = segment_distance(segments[i], segments[j]) <= 0.15
+    assert {tuple(pair) for pair in pairs.tolist()} >= set(zip(i[close].tolist(), j[close].tolist(), strict=True))
+    assert segment_distance(segments[pairs[:, 0]], segments[pairs[:, 1]]).max() < 0.16
+    assert smallest_chart_gap(segments, chart, spacing=0.01) == pytest.approx(0.1, abs=1e-5)
+
+
+def test_one_segment_stands_for_those_of_its_chart_in_a_square() -> None:
+    segments = np.concatenate([box(0.0, 0.0, 0.1, 0.1), box(0.0, 0.0, 0.1, 0.1), box(5.0, 5.0, 3.0, 3.0)])
+    chart = np.repeat([0, 1, 1], 4)
+    assert spread(segments, chart, cell=1.0).tolist() == [0, 4, 8, 9, 10, 11]
 
 
 def test_closest_points_lie_on_their_segments() -> None:
