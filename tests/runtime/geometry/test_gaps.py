@@ -80,7 +80,7 @@ def test_outlines_of_thousands_of_short_segments_have_the_pairs_of_all_with_all(
     angle = np.linspace(0.0, 2.0 * np.pi, 3001)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     one = np.stack([ring[:-1], ring[1:]], axis=1)
-    segments, chart = np.concatenate([one, one + [2.1, 0.0]]), np.repeat([0, 1], 3000)
+    segments, chart = np.concatenate([one, one + np.array([2.1, 0.0])]), np.repeat([0, 1], 3000)
     pairs = near_segments(segments, chart, spacing=0.05, reach=0.15)
     i, j = (rows.reshape(-1) for rows in np.meshgrid(np.arange(3000), 3000 + np.arange(3000), indexing="ij"))
     facing = np.linalg.norm(segments[i, 0] - segments[j, 0], axis=1) < 0.2
