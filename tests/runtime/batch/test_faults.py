@@ -138,7 +138,7 @@ def test_a_second_ctrl_c_ends_at_once(runs: Any, meshes: Path, undisturbed: dict
 def test_ctrl_c_gives_back_what_runs_and_the_next_run_completes_it(
     runs: Any, meshes: Path, undisturbed: dict[str, object], tmp_path: Path
 ) -> None:
-    run = runs.begun(meshes, tmp_path)
+    run = runs.begun(meshes, tmp_path, "--workers", "1")  # two would end all three in the time that they get
     while not (tmp_path / "manifest.jsonl").exists() or not (tmp_path / "manifest.jsonl").stat().st_size:
         time.sleep(0.02)
     run.send_signal(signal.SIGINT)
