@@ -21,7 +21,7 @@ from ..runtime.pack.config import PackConfig
 from ..runtime.pack.packing import Packed
 from ..runtime.sessions.agreement import agreement
 from ..runtime.sessions.session import UnwrapSession
-from ..train.charts.recut import recut
+from ..train.charts.recut import drawn_again
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force, wrap_in_force
 from ..train.polygons import whole_polygons
@@ -116,7 +116,7 @@ def _with_charts(asset: Asset, trained: Trained, charts: Charts) -> Trained:
 
 
 def _valid_atlas(asset: Asset, trained: Trained, square: Square) -> tuple[Trained, Packed]:
-    """Packed charts that are valid as written; those that float32 could not hold are cut again, and all fitted anew.
+    """Packed charts that are valid as written; those that float32 could not hold are drawn again, and all fitted anew.
 
     Raises: FinishError where charts stay invalid (a defect).
     """
@@ -126,10 +126,8 @@ def _valid_atlas(asset: Asset, trained: Trained, square: Square) -> tuple[Traine
     for _ in range(config.recuts):
         if len(packed.invalid) == 0:
             return trained, packed
-        charts = recut(asset.surface, trained.charts, packed.invalid, packed.atlas.corner_uv)
-        note = (
-            f"{len(packed.invalid)} charts lost triangles too thin for the numbers of a file: each is its own chart now"
-        )
+        written = packed.atlas.corner_uv
+        charts, note = drawn_again(asset.surface, trained.charts, packed.invalid, written, config.least_edge)
         report = {**trained.report, "notes": [*trained.report.get("notes", []), note]}
         trained = _with_charts(asset, replace(trained, report=report), charts)
         packed = pack_asked(asset, charts, square, seed, config)

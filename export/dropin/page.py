@@ -26,7 +26,7 @@ from ...runtime.pack.config import PackConfig
 from ...runtime.pack.packing import Packed, pack
 from ...runtime.progress import Stages
 from ...train.charts.charts import Finished, chart_surface
-from ...train.charts.recut import recut
+from ...train.charts.recut import drawn_again
 from ...train.config import FinishConfig
 from ...train.finish.config import ProjectConfig
 from ...train.finish.projected import projected
@@ -233,13 +233,13 @@ def _in_page(asset: Asset, charts: Charts, wanted: Wanted, seed: int, config: Pa
 
 
 def _valid(asset: Asset, charts: Charts, side: int, padding: int, seed: int) -> tuple[Packed, Charts]:
-    """The charts packed, those that float32 can't hold cut again; layouts of others stay as they are."""
+    """The charts packed, those that float32 can't hold drawn again; layouts of others stay as they are."""
     config = PackConfig()
     packed = pack(asset, charts, size=side, padding=padding, seed=seed, config=config)
     for _ in range(config.recuts):
         if len(packed.invalid) == 0 or "uv" in charts.method:
             break
-        charts = recut(asset.surface, charts, packed.invalid, packed.atlas.corner_uv)
+        charts = drawn_again(asset.surface, charts, packed.invalid, packed.atlas.corner_uv, config.least_edge)[0]
         packed = pack(asset, charts, size=side, padding=padding, seed=seed, config=config)
     if len(packed.invalid):
         LOG.warning("%d charts hold triangles that overlap or lie upside down", len(packed.invalid))

@@ -154,4 +154,7 @@ class PackConfig:
     islands: IslandConfig = field(default_factory=IslandConfig)
     stacks: StackConfig = field(default_factory=StackConfig)
     recuts: int = 4
-    """How often charts that float32 can't hold are cut again and all are packed anew."""
+    """How often charts that float32 can't hold are drawn larger or cut again, and all are packed anew."""
+    least_edge: float = 1.6e-5
+    """Median edge of such a chart, in sides of the page, up to which it is drawn larger instead: 256 steps of float32
+    near 1, a thirtieth of a texel of 2048."""

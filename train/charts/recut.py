@@ -1,11 +1,13 @@
 """Charts that float32 could not hold, cut again: the faces that fail the exact test become charts of their own.
 
 Packing proves every chart on the numbers that are written.  Where a triangle lies upside down there or over another (a
-sliver whose neighbours left it no room), it is taken out of its chart and laid flat by itself.   f faces · k charts.
+sliver whose neighbours left it no room), it is taken out of its chart and laid flat by itself.  A chart whose triangles
+are mostly that small (a screw on a ship) is drawn larger instead.   f faces · k charts.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +20,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
+
+MOST = 1e6
+"""Times that a chart of no size is drawn larger."""
+
+
+def drawn_again(
+    surface: Surface, charts: Charts, invalid: NDArray[np.int64], written: NDArray[np.float64], least: float
+) -> tuple[Charts, str]:
+    """Charts for the packer to try next, and what is said of them: the invalid ones `enlarged`, else `recut`."""
+    larger, which = enlarged(charts, invalid, written, least)
+    if len(which):
+        return larger, f"{len(which)} charts are drawn larger: at the size of the others float32 merges their points"
+    cut = recut(surface, charts, invalid, written)
+    return cut, f"{len(invalid)} charts lost triangles too thin for the numbers of a file: each is its own chart now"
 
 
 def recut(surface: Surface, charts: Charts, invalid: NDArray[np.int64], written: NDArray[np.float64]) -> Charts:
@@ -43,6 +59,29 @@ def recut(surface: Surface, charts: Charts, invalid: NDArray[np.int64], written:
     first = np.unique(face_chart, return_index=True)[1]
     methods = tuple("triangle" if wrong[face] else charts.method[charts.face_chart[face]] for face in first.tolist())
     return Charts(face_chart, corner_uv, face_chart, np.arange(len(methods)), methods)
+
+
+def enlarged(
+    charts: Charts, invalid: NDArray[np.int64], written: NDArray[np.float64], least: float
+) -> tuple[Charts, NDArray[np.int64]]:
+    """The charts, those of the invalid ones larger whose triangles are too small for the numbers of a file.
+
+    Args:
+        charts: of the mesh's faces.
+        invalid: (i,) numbers of the charts that failed.
+        written: (f, 3, 2) uv of the corners in the atlas, as written.
+        least: median length of a chart's edges in the atlas below which it is drawn larger, up to that length.
+
+    Returns:
+        The charts, and (j,) which of the invalid ones were drawn larger.
+    """
+    factor = np.ones(len(charts.method))
+    for chart in invalid.tolist():
+        uv = written[charts.face_chart == chart]
+        edges = np.linalg.norm(uv - np.roll(uv, -1, axis=1), axis=2)
+        factor[chart] = max(least / max(float(np.median(edges)), least / MOST), 1.0)
+    uv = charts.corner_uv * factor[charts.face_chart, None, None]
+    return replace(charts, corner_uv=uv), np.flatnonzero(factor > 1.0)
 
 
 def smaller_of_each(uv: NDArray[np.float64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:

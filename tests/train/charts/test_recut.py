@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+import flexpara
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.mesh import Charts, Surface
-from flexpara.train.charts.recut import laid_flat, recut, smaller_of_each
+from flexpara.runtime.samples import make_sample
+from flexpara.train.charts.recut import drawn_again, enlarged, laid_flat, recut, smaller_of_each
 
 QUAD = Surface(np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 STRIP = Surface(
@@ -54,6 +57,36 @@ def test_charts_that_are_valid_stay_as_they_are() -> None:
     found = recut(STRIP, charts, np.zeros(0, dtype=np.int64), charts.corner_uv)
     assert found.face_chart.tolist() == [0, 0, 0]
     assert np.array_equal(found.corner_uv, charts.corner_uv)
+
+
+def test_a_chart_of_too_small_triangles_is_drawn_larger_up_to_the_length_that_can_be_told() -> None:
+    charts = one_chart(QUAD)  # its edges: 1, 2 and √5, the median 2
+    found, which = enlarged(charts, np.array([0]), 1e-8 * charts.corner_uv, least=1e-5)
+    assert which.tolist() == [0]
+    assert found.corner_uv == pytest.approx(500.0 * charts.corner_uv)
+    assert found.method == charts.method
+
+
+def test_larger_is_tried_before_cutting_and_large_charts_are_cut() -> None:
+    charts = one_chart(QUAD)
+    flipped = charts.corner_uv.copy()
+    flipped[1] = flipped[1, ::-1]
+    small, said = drawn_again(QUAD, charts, np.array([0]), 1e-8 * flipped, 1e-5)
+    assert (small.method, said.split(":")[0]) == (("slim",), "1 charts are drawn larger")
+    cut, said = drawn_again(QUAD, charts, np.array([0]), flipped, 1e-5)
+    assert (cut.method, said.split(":")[0]) == (
+        ("slim", "triangle"),
+        "1 charts lost triangles too thin for the numbers of a file",
+    )
+
+
+def test_a_part_a_million_times_smaller_beside_a_large_one_comes_out_valid() -> None:
+    vertices, faces = make_sample("sphere", resolution=16)
+    both = np.concatenate([vertices, 1e-6 * vertices + 3.0])
+    result = flexpara.unwrap((both, np.concatenate([faces, faces + len(vertices)])), size=256)
+    assert result.report["metrics"]["flipped_faces"] == 0
+    assert result.report["metrics"]["overlap_fraction"] == 0.0
+    assert any("drawn larger" in note for note in result.report["train"]["notes"])
 
 
 def test_a_triangle_is_laid_flat_with_the_sides_it_has() -> None:
