@@ -110,7 +110,8 @@ def bake(
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         check_outputs(folder, job.outputs, job.maps, meshes=False)
         with console.progress() as progress:
-            facts |= _bake_squares(folder, job, options) if options.udim else _bake_one(folder, job, Clock(progress))
+            bake_files = _bake_squares if options.udim else _bake_one
+            facts |= bake_files(folder, job, Clock(progress))
         facts |= {} if high is None else {"high": high.report()}
         folder.write_report(facts)
         written = folder.commit()
@@ -153,14 +154,12 @@ def _bake_one(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any
     return {"textures": textures}
 
 
-def _bake_squares(folder: OutputFolder, job: BakeJob, options: BakeOptions) -> dict[str, Any]:
+def _bake_squares(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any]:
     """Bake and write one image for each map and square of uv; the squares' numbers for the report."""
-    from .results.udim import bake_udim, write_udim
+    from .results.tiles import baked_tiles
+    from .results.udim import write_udim
 
-    gutter = gutter_of(job.atlas, job.outputs)
-    asked = {"size": options.size, "padding": gutter, "samples": options.samples, "denoise": options.denoise}
-    tiles = bake_udim(job.atlas, job.asset, list(job.maps), **asked)
-    kind = options.texture_format
+    tiles, kind = baked_tiles(job, clock), job.outputs.texture_format
     folder.write_several(lambda path: write_udim(tiles, path, job.asset.stem, file_type=kind))
     return {"tiles": list(tiles)}
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import tempfile
 import warnings
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from ..checks import exr_settings
 from .meshes import MeshJob, write_meshes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
@@ -107,15 +108,17 @@ def bake_textures(output: OutputFolder, job: BakeJob, clock: Clock) -> Baked:
         return Baked({}, {})
     from .. import baker
 
-    names = [entry.name for entry in job.maps]
-    tell = partial(_tell_map, clock, names)
-    textures = baker.bake(job.atlas, job.asset, list(job.maps), bake_settings(job), progress=tell)
-    clock("bake", len(names), len(names))
+    with baking(clock, len(job.maps)) as begun:
+        textures = baker.bake(job.atlas, job.asset, list(job.maps), bake_settings(job), progress=begun)
     return write_baked(output, job, textures, clock)
 
 
-def _tell_map(clock: Clock, names: Sequence[str], name: str) -> None:
-    clock("bake", names.index(name), len(names))
+@contextmanager
+def baking(clock: Clock, steps: int) -> Iterator[Callable[[str], None]]:
+    """Around the baking of so many images: what is called as each begins."""
+    number = count()
+    yield lambda _name: clock("bake", next(number), steps)
+    clock("bake", steps, steps)
 
 
 def bake_settings(job: BakeJob) -> BakeSettings:

@@ -12,7 +12,16 @@ import numpy as np
 
 from ..checks import check_outputs, chosen_maps, possible_files
 from .meshes import MeshJob, write_scenes
-from .output import BakeJob, bake_settings, texture_facts, texture_notes, write_baked, write_preview, written_notes
+from .output import (
+    BakeJob,
+    bake_settings,
+    baking,
+    texture_facts,
+    texture_notes,
+    write_baked,
+    write_preview,
+    written_notes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -72,8 +81,8 @@ def _baked(jobs: Sequence[BakeJob], clock: Clock) -> list[dict[str, Texture]]:
     parts = [
         Part(Ground(job.atlas, job.asset), job.maps, bake_settings(job), (number, 0)) for number, job in enumerate(jobs)
     ]
-    with clock.stage("bake"):
-        return bake_together(side_by_side([job.atlas for job in jobs]), parts)
+    with baking(clock, sum(len(job.maps) for job in jobs)) as begun:
+        return bake_together(side_by_side([job.atlas for job in jobs]), parts, begun)
 
 
 def side_by_side(atlases: Sequence[Atlas]) -> Atlas:

@@ -11,7 +11,7 @@ from ...runtime.pack.packing import atlas_of_corners
 from ...runtime.pack.pages import ACROSS
 from ..checks import check_outputs, chosen_maps
 from .meshes import MeshJob, write_meshes
-from .output import BakeJob, gutter_of, written_notes
+from .output import BakeJob, bake_settings, baking, written_notes
 from .udim import udim_tiles
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.unwrap import Outputs
     from ...runtime.progress import Clock
+    from ..texture import Texture
 
 
 def write_tiles(output: OutputFolder, whole: BakeJob, pieces: Sequence[BakeJob], clock: Clock) -> dict[str, Any]:
@@ -40,7 +41,7 @@ def write_tiles(output: OutputFolder, whole: BakeJob, pieces: Sequence[BakeJob],
     named = [file for number in tiles for file in udim_names(maps, stem, number, file_type=kind).values()]
     meshes = [f"{piece.asset.stem}.{ending}" for piece in pieces for ending in piece.outputs.formats]
     check_outputs(output, replace(whole.outputs, report=False), [], meshes=False, more=[*named, *meshes])
-    baked = _baked_tiles(whole, clock)
+    baked = baked_tiles(whole, clock)
     files = udim_names(maps, stem, file_type=kind)
     output.write_several(lambda folder: write_udim(baked, folder, stem, file_type=kind) if maps else [])
     written: dict[str, Any] = {}
@@ -71,11 +72,11 @@ def tiled_job(asset: Asset, tile: NDArray[np.int64], atlases: Sequence[Atlas], o
     return BakeJob.of(atlas_of_corners(asset, chart, corner_uv, like), asset, outputs, chosen_maps(outputs, seed=seed))
 
 
-def _baked_tiles(job: BakeJob, clock: Clock) -> dict[int, Any]:
+def baked_tiles(job: BakeJob, clock: Clock) -> dict[int, dict[str, Texture]]:
+    """Tile number → name → Texture; none where nothing is baked.  Raises: as `udim.bake_udim`."""
     from .udim import bake_udim
 
     if not job.maps:
         return {}
-    with clock.stage("bake"):
-        asked = {"size": job.atlas.size, "samples": job.outputs.samples, "denoise": job.outputs.denoise}
-        return bake_udim(job.atlas, job.asset, list(job.maps), padding=gutter_of(job.atlas, job.outputs), **asked)
+    with baking(clock, len(job.maps) * len(udim_tiles(job.atlas))) as begun:
+        return bake_udim(job.atlas, job.asset, list(job.maps), bake_settings(job), progress=begun)

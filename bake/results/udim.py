@@ -20,7 +20,7 @@ from ..settings import BakeSettings
 from ..windows import Ground
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from ...runtime.mesh import Asset, Atlas
@@ -63,17 +63,24 @@ def tile_of(number: int) -> tuple[int, int]:
 
 
 def bake_udim(
-    atlas: Atlas, asset: Asset, maps: Sequence[str | BakeMap], settings: BakeSettings | None = None, **keywords: Any
+    atlas: Atlas,
+    asset: Asset,
+    maps: Sequence[str | BakeMap],
+    settings: BakeSettings | None = None,
+    *,
+    progress: Callable[[str], None] = lambda _: None,
+    **keywords: Any,
 ) -> dict[int, dict[str, Texture]]:
     """Tile number → name → Texture, as `baker.bake` with the same settings; seams between tiles are closed too.
 
+    progress: called with each map's name before it is made, for each tile.
     Raises: as `udim_tiles` and `baker.bake`.
     """
     made, numbers = from_keywords(BakeSettings, settings, keywords), udim_tiles(atlas)
     chosen, ground = find_maps(maps, normal_format=made.normal_format), Ground(atlas, asset)
     tiles = [tile_of(number) for number in numbers]
     parts = [Part(ground, chosen, replace(made, tile=tile), tile) for tile in tiles]
-    return dict(zip(numbers, bake_together(atlas, parts), strict=True))
+    return dict(zip(numbers, bake_together(atlas, parts, progress), strict=True))
 
 
 def udim_names(

@@ -97,3 +97,9 @@ def test_files_carry_the_number(spread: Pair, tmp_path: Path) -> None:
 def test_uv_that_udim_cannot_name_are_refused(two_charts: Pair, move: tuple[float, float], text: str) -> None:
     with pytest.raises(InputError, match=text):
         udim_tiles(replace(two_charts[0], uv=two_charts[0].uv + np.array(move, np.float32)))
+
+
+def test_each_map_of_each_tile_is_told_before_it_is_made(spread: Pair) -> None:
+    told: list[str] = []
+    bake_udim(*spread, ["position", "face-id"], size=16, progress=told.append)
+    assert told == ["position", "face-id"] * 2
