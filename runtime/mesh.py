@@ -202,7 +202,7 @@ class Atlas:
     @property
     def even_uv(self) -> NDArray[np.float64]:
         """(f, 3, 2) float64: the uv in sides of the page, in which shapes are what they are on it."""
-        return self.page.even(self.corner_uv) if self.size else self.corner_uv
+        return self.page.even(self.corner_uv)
 
     @property
     def face_stack(self) -> NDArray[np.int64] | None:

@@ -56,8 +56,8 @@ class PageSize(NamedTuple):
 
     @property
     def extent(self) -> NDArray[np.float64]:
-        """(2,) width and height in sides of the page: the longer one is 1."""
-        return np.array(self, dtype=np.float64) / self.side
+        """(2,) width and height in sides of the page: the longer one is 1; both of a page of unknown size, 0."""
+        return np.ones(2) if self.is_square else np.array(self, dtype=np.float64) / self.side
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -94,7 +94,7 @@ def solid(atlas: Atlas, normals: NDArray[np.float64], colors: NDArray[np.float32
 
 def layout(atlas: Atlas, colors: NDArray[np.float32]) -> tuple[Camera, Shape, Lines]:
     """The page seen from above: white sheet, charts in their colours (k, 3), their outlines."""
-    extent = atlas.page.extent if atlas.size else np.ones(2)
+    extent = atlas.page.extent
     sheet = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]) * extent
     flat = np.concatenate([sheet, atlas.even_uv])
     height = np.concatenate([np.zeros(2), np.ones(len(atlas.faces))])

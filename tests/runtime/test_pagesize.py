@@ -31,6 +31,7 @@ def test_lengths_are_in_sides_of_the_page() -> None:
     assert page.even(np.array([[1.0, 1.0]])).tolist() == [[1.0, 0.5]]
     uv = np.ones((2, 2))
     assert PageSize(7, 7).even(uv) is uv
+    assert PageSize.of(0).extent.tolist() == [1.0, 1.0]  # unknown
 
 
 def test_options_ask_each_side_for_its_range() -> None:
