@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..geometry.triangles import cross_2d, signed_areas
 from .polygons import fans
 
 if TYPE_CHECKING:
@@ -99,10 +100,9 @@ def _uncut(
 def _fan_starts(uv: NDArray[np.float32], loops: Loops) -> dict[int, int]:
     """Loop → the corner from which its fan lies right in the plane, or −1, for loops whose own fan does not."""
     points = uv[loops.vertex].astype(np.float64)
-    a, b, c = points[fans(loops.size)[0].T]
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    corner, owner = fans(loops.size)
+    area = signed_areas(points[corner])
     first, found = np.cumsum(loops.size) - loops.size, dict[int, int]()
-    owner = fans(loops.size)[1]
     facing = np.sign(np.bincount(owner, area, minlength=len(loops.size)))  # uv of others may be mirrored
     for loop in np.unique(owner[area * facing[owner] < 0.0]).tolist():
         ring = points[first[loop] : first[loop] + loops.size[loop]]
@@ -113,7 +113,7 @@ def _fan_starts(uv: NDArray[np.float32], loops: Loops) -> dict[int, int]:
 def _is_fan(ring: NDArray[np.float64]) -> bool:
     """Whether the fan of a ring (n, 2) from its first corner turns nowhere."""
     spokes = ring[1:] - ring[0]
-    area = spokes[:-1, 0] * spokes[1:, 1] - spokes[:-1, 1] * spokes[1:, 0]
+    area = cross_2d(spokes[:-1], spokes[1:])
     return bool((area >= 0.0).all() or (area <= 0.0).all())
 
 
