@@ -50,7 +50,7 @@ class Block(NamedTuple):
 
 def plain_lines(data: bytes) -> Plain | None:
     """The file, None where it is not plain."""
-    if any(odd in data for odd in ODD) or data.count(b"\r") != data.count(b"\r\n") or not data.isascii():
+    if is_odd(data):
         return None
     letters = np.frombuffer(data if data.endswith(b"\n") else data + b"\n", dtype=np.uint8)
     end = np.flatnonzero(letters == ord("\n")) + 1
@@ -68,6 +68,11 @@ def plain_lines(data: bytes) -> Plain | None:
     ]
     number = tuple(np.flatnonzero(kind == code) + 1 for code in range(len(KEYWORDS)))
     return Plain(tuple(table for table in tables if table is not None), corners, faces.words, number, others)
+
+
+def is_odd(data: bytes) -> bool:
+    """Whether lines may be joined, indented by tabs, of other letters than ASCII, or end otherwise than most do."""
+    return any(odd in data for odd in ODD) or data.count(b"\r") != data.count(b"\r\n") or not data.isascii()
 
 
 def kinds(letters: NDArray[np.uint8], start: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..text import lines_of
-from .plain import ODD
+from .plain import is_odd
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,7 +78,7 @@ class ObjText:
 
 def besides_tables(data: bytes) -> list[str] | None:
     """The lines that begin with neither v nor f; None where lines may be joined, or end otherwise than most do."""
-    if any(odd in data for odd in ODD) or data.count(b"\r") != data.count(b"\r\n") or not data.isascii():
+    if is_odd(data):
         return None
     letters = np.frombuffer(data + b"\n", dtype=np.uint8)
     end = np.flatnonzero(letters == ord("\n"))
