@@ -10,7 +10,7 @@ import numpy as np
 from ...runtime.errors import InputError
 from ...runtime.io.asset.pages import part_of
 from ...runtime.pack.packing import atlas_of_corners
-from ...runtime.pack.pages import ACROSS
+from ...runtime.pack.pages import tile_corners
 from ..results.pages import check_pages, page_jobs, page_notes, write_pages
 from ..results.tiles import tile_notes, write_tiles
 
@@ -68,6 +68,6 @@ def pages_with_atlases(result: PackResult) -> list[tuple[Asset, Atlas]]:
     for number in np.unique(result.page).tolist():
         own = result.page == number
         page = part_of(result.asset, own, f"{result.asset.stem}_{number + 1}")
-        uv = result.atlas.uv[result.atlas.faces[own]] - np.array([number % ACROSS, number // ACROSS], np.float32)
+        uv = result.atlas.uv[result.atlas.faces[own]] - tile_corners(number)
         found.append((page, atlas_of_corners(page, result.atlas.face_chart[own], uv, result.atlas)))
     return found

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.pack.packing import atlas_of_corners
-from ...runtime.pack.pages import ACROSS
+from ...runtime.pack.pages import tile_corners
 from ..checks import check_outputs, chosen_maps
 from .meshes import MeshJob, write_meshes
 from .output import BakeJob, bake_settings, baking, written_notes
@@ -64,8 +64,7 @@ def tiled_job(asset: Asset, tile: NDArray[np.int64], atlases: Sequence[Atlas], o
     corner_uv, chart, first = np.zeros((len(tile), 3, 2), np.float32), np.zeros(len(tile), np.int64), 0
     for number, atlas in enumerate(atlases):
         own = tile == number
-        square = np.array([number % ACROSS, number // ACROSS], np.float32)
-        corner_uv[own], chart[own] = atlas.uv[atlas.faces] + square, atlas.face_chart + first
+        corner_uv[own], chart[own] = atlas.uv[atlas.faces] + tile_corners(number), atlas.face_chart + first
         first += int(atlas.face_chart.max(initial=-1)) + 1
     outputs = replace(outputs.for_asset(asset), preview=False)
     like = replace(atlases[0], placement=None)

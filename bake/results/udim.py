@@ -13,6 +13,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.options.keywords import from_keywords
+from ...runtime.pack.pages import ACROSS
 from ..baker import Part, bake_together, find_maps
 from ..files.images import write_texture
 from ..files.textures import texture_names
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from ..bakemap import BakeMap
     from ..texture import FileType, Texture
 
-FIRST, ACROSS, UP = 1001, 10, 100
-"""Number of the first tile, tiles in a row, rows."""
+FIRST, UP = 1001, 100
+"""Number of the first tile, rows."""
 SLACK = 1e-4
 """How far a chart may reach into a neighbouring square (rounding of other tools) without being part of it."""
 

@@ -78,8 +78,13 @@ def pack_pages(
 
 def on_tiles(paged: Paged) -> NDArray[np.float32]:
     """(f, 3, 2) uv of the corners with each page in a square of its own."""
-    place = np.stack([paged.page % ACROSS, paged.page // ACROSS], axis=1)
-    return paged.corner_uv + place[:, None].astype(np.float32)
+    return paged.corner_uv + tile_corners(paged.page)[:, None]
+
+
+def tile_corners(page: NDArray[np.int64] | int) -> NDArray[np.float32]:
+    """(…, 2) float32 uv of the lower left corners of the tiles of pages (…)."""
+    up, across = np.divmod(page, ACROSS)
+    return np.stack([across, up], axis=-1).astype(np.float32)
 
 
 def _packed(
