@@ -10,11 +10,13 @@ if TYPE_CHECKING:
     from .header import PlyHeader
 
 COLORS = ("red", "green", "blue", "alpha")
-READ = frozenset(
-    {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v", "f_dc_0", "f_dc_1", "f_dc_2"}
-    | {"opacity", "vertex_indices", "vertex_index", "texcoord", "texnumber"}
-    | {f"{prefix}{name}" for prefix in ("", "diffuse_") for name in COLORS}
-)
+UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+"""Names that uv have, by program."""
+CORNERS = ("vertex_indices", "vertex_index")
+USED = {*("x", "y", "z", "nx", "ny", "nz"), *sum(UV, ())}
+USED |= {f"{prefix}{name}" for prefix in ("", "diffuse_") for name in COLORS}
+"""Properties of vertices that a mesh is made of."""
+READ = USED | {*("f_dc_0", "f_dc_1", "f_dc_2", "opacity"), *CORNERS, *("texcoord", "texnumber")}
 """Properties of vertices and faces that are taken."""
 SPLATS = ("scale_", "rot_", "f_rest_")
 """How names of a Gaussian splat's extent and turn begin, and of how its colour changes with the view."""

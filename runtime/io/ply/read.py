@@ -23,7 +23,7 @@ from ..polygons import Triangles, strip_triangles, triangles_of
 from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body
 from .header import FACES, ply_header
-from .leftout import COLORS, left_out
+from .leftout import COLORS, CORNERS, USED, UV, left_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
 
 HARMONIC = 0.5 / math.sqrt(math.pi)
 """Value of the constant spherical harmonic."""
-UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-CORNERS = ("vertex_indices", "vertex_index")
-USED = {*("x", "y", "z", "nx", "ny", "nz"), *COLORS, *(f"diffuse_{name}" for name in COLORS), *sum(UV_NAMES, ())}
-"""Properties of vertices that a mesh is made of."""
 
 
 def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMesh:
@@ -60,7 +56,7 @@ def read_ply(data: bytes, read_sibling: Callable[[str], bytes | None]) -> RawMes
     positions = _group(vertices, ("x", "y", "z"))
     if positions is None:
         raise MeshError(f"the PLY vertices have {[*vertices]}, expected x y z; check the export")
-    uv = next((found for names in UV_NAMES if (found := _group(vertices, names)) is not None), None)
+    uv = next((found for names in UV if (found := _group(vertices, names)) is not None), None)
     colors = _colors(vertices)
     raw = RawMesh(
         positions=positions,
