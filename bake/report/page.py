@@ -101,7 +101,7 @@ def _result_data(result: Result, top: float) -> dict[str, Any]:
     return {
         "title": result.title,
         "mesh": result.mesh,
-        "size": result.size,
+        "size": None if result.page is None else result.page.side,
         "extent": shape.extent.tolist(),
         "cleanMip": result.metrics.get("bleed_free_mip"),
         "pictures": dict(result.pictures),

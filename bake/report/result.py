@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...runtime.errors import InputError
 from ...runtime.geometry.metrics import measure
 from ...runtime.io.asset.changes import told
@@ -31,8 +29,8 @@ class Result:
     """One result.
 
     title: what it is called.  mesh: results of the same word have the same faces in the same order.
-    metrics, seconds: name → number.  pictures: map → data address.  notes: sentences.  size: longer side of the
-    page in texels, where it is known.
+    metrics, seconds: name → number.  pictures: map → data address.  notes: sentences.  page: its size, where it is
+    known.
     """
 
     title: str
@@ -43,22 +41,14 @@ class Result:
     seconds: Mapping[str, float] = field(default_factory=dict)
     pictures: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    size: int | None = None
-
-    @property
-    def page(self) -> PageSize | None:
-        """The page as far as it is known."""
-        if self.size is None:
-            return None
-        width, height = np.rint(self.size * self.shape.extent).astype(int).tolist()
-        return PageSize(width, height)
+    page: PageSize | None = None
 
 
 def measured(title: str, shape: Shape, mesh: str, page: PageSize | None = None) -> Result:
     """A layout of which nothing is known but itself, measured.  Raises: InputError as `metrics.measure`."""
     shape = shape if page is None else replace(shape, extent=page.extent)
     metrics = measure(shape.surface, shape.corner_uv, size=None if page is None else page.stored).to_dict()
-    return Result(title, shape, face_facts(shape), mesh, metrics, size=None if page is None else page.side)
+    return Result(title, shape, face_facts(shape), mesh, metrics, page=page)
 
 
 def page_in(value: object) -> PageSize | None:
@@ -89,7 +79,7 @@ def reported(title: str, shape: Shape, report: Mapping[str, Any], folder: Path, 
         {name: value for name, value in numbers(part(report, "seconds")).items() if value >= 0.0},
         pictures,
         (*_said(report), *notes),
-        fresh.size,
+        page,
     )
 
 

@@ -68,7 +68,7 @@ def test_numbers_of_a_foreign_report_are_taken_only_where_they_are_numbers(folde
     assert result.metrics["charts"] == 2
     assert "chart_agreement" not in result.metrics
     assert list(result.seconds.values()) == [1.5]
-    assert (result.size, result.notes[1]) == (64, "2 faces turned to agree with the others around")
+    assert (result.page, result.notes[1]) == ((64, 64), "2 faces turned to agree with the others around")
 
 
 def test_pictures_outside_the_folder_are_not_shown(folder: Path) -> None:
