@@ -251,9 +251,9 @@ class UnwrapResult(Unwrapping):
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
         from .bake.checks import check_outputs, chosen_maps
-        from .bake.results.output import BakeJob, result_notes, stack_notes, write_outputs, write_reports
+        from .bake.results.output import BakeJob, result_notes, stack_notes, with_cut, write_outputs, write_reports
         from .export.assemble import write_networks
-        from .runtime.io.asset.changes import lost, told
+        from .runtime.io.asset.changes import lost
         from .runtime.io.points.written import point_files, write_points
         from .runtime.progress import Clock
 
@@ -269,12 +269,10 @@ class UnwrapResult(Unwrapping):
         apart = report["metrics"]["overlap_fraction"] == 0.0
         job = BakeJob.of(self.found.atlas, self.asset, outputs, maps)
         report |= write_outputs(output, job, clock, apart=apart)
-        if cut := report.pop("polygons_cut"):
-            report["changes"]["polygons_cut"] = cut
         if note is not None:
-            for fact in (*told({"polygons_cut": cut}), *stack_notes(report["pack"]), *result_notes(report)):
+            for fact in (*stack_notes(report["pack"]), *result_notes(report)):
                 note(f"{self.asset.stem}: {fact}")
-        write_reports(output, job, {**report, "seconds": {**report["seconds"], **clock.rounded}})
+        write_reports(output, job, {**with_cut(report), "seconds": {**report["seconds"], **clock.rounded}})
         return output.commit()
 
 
@@ -308,17 +306,19 @@ class UnwrapPages(Unwrapping):
         note: Callable[[str], None] | None = None,
     ) -> tuple[Path, ...]:
         """As `save`, into an open OutputFolder."""
+        from .bake.results.output import with_cut
         from .bake.results.several import Several
         from .export.assemble import write_networks
         from .runtime.progress import Clock
 
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
         pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
-        jobs = (several := Several(self.asset, self.tile, pairs, outputs, seed)).jobs(output)
+        several = Several(self.asset, self.tile, pairs, outputs, seed)
+        jobs = several.jobs(output)
         for page in self.pages:
             networks = write_networks(output, page.asset, page.found, clock, inverse=outputs.inverse)
             report["pages"][page.asset.stem] = {**page.report, **networks}
         apart = all(entry["metrics"]["overlap_fraction"] == 0.0 for entry in self.reports)
-        facts = several.write(output, jobs, clock, note or (lambda _: None), apart=apart)
-        output.write_report({**report, **facts, "seconds": clock.rounded})
+        report |= several.write(output, jobs, clock, note or (lambda _: None), apart=apart)
+        output.write_report({**with_cut(report), "seconds": clock.rounded})
         return output.commit()

@@ -47,6 +47,20 @@ def test_udim_tiles_hold_an_island_each_and_their_textures_are_named_by_number(h
     assert sum(line.startswith("f ") for line in (out / "house.obj").read_text(encoding="utf-8").splitlines()) == 2
 
 
+def test_polygons_that_no_fan_covers_are_told_and_counted_on_tiles_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    places = [(0, 0), (4, 0), (4, 3), (3, 3), (3, 1), (1, 1), (1, 3), (0, 3), (6, 0), (7, 0), (7, 1), (6, 1)]
+    lines = [f"v {x} {y} 0\nvt {x / 7} {y / 7}" for x, y in places]
+    lines += ["f " + " ".join(f"{corner}/{corner}" for corner in face) for face in (range(1, 9), range(9, 13))]
+    (tmp_path / "zigzag.obj").write_text("\n".join(lines), encoding="utf-8")
+    assert packed(tmp_path / "zigzag.obj", tmp_path / "out", "--udim", "--maps", "none") == 0
+    assert "1 polygon cut by seams or covered by no fan, written as triangles" in capsys.readouterr().err
+    report = json.loads((tmp_path / "out" / "zigzag.report.json").read_text(encoding="utf-8"))
+    assert report["changes"]["polygons_cut"] == 1
+    assert "polygons_cut" not in report
+
+
 def test_usd_names_the_tiles_too(house: Path, tmp_path: Path) -> None:
     assert packed(house, tmp_path / "out", "--udim", "--format", "usda") == 0
     assert "@house_base-color.<UDIM>.png@" in (tmp_path / "out" / "house.usda").read_text(encoding="utf-8")

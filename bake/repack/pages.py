@@ -11,6 +11,7 @@ from ...runtime.errors import InputError
 from ...runtime.io.asset.pages import part_of
 from ...runtime.pack.packing import atlas_of_corners
 from ...runtime.pack.pages import tile_corners
+from ..results.output import with_cut
 from ..results.pages import check_pages, page_jobs, page_notes, write_pages
 from ..results.tiles import tile_notes, write_tiles
 
@@ -35,7 +36,7 @@ def write_on_tiles(
     report = {**result.report, **write_tiles(output, whole, pieces, clock)}
     for fact in tile_notes(report, result.asset.stem):
         note(fact)
-    return report
+    return with_cut(report)
 
 
 def write_on_pages(

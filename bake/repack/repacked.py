@@ -20,7 +20,7 @@ from ...runtime.progress import Clock
 from ...runtime.saving import Saving
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
-from ..results.output import BakeJob, stack_notes, texture_notes, write_outputs
+from ..results.output import BakeJob, stack_notes, texture_notes, with_cut, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -97,11 +97,10 @@ class PackResult(Saving[PackOutputs]):
         apart = self.report["metrics"]["overlap_fraction"] == 0.0
         report = {**self.report, "outputs": asdict(whole.outputs)}
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
-        cut = {"polygons_cut": report.pop("polygons_cut")}
-        report["changes"] = {**report["changes"], **(cut if any(cut.values()) else {})}
-        for fact in (*told(cut), *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):
+        cut = told({"polygons_cut": report["polygons_cut"]})
+        for fact in (*cut, *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):
             say(f"{self.asset.stem}: {fact}")
-        output.write_report({**report, "seconds": clock.rounded})
+        output.write_report({**with_cut(report), "seconds": clock.rounded})
         return output.commit()
 
 

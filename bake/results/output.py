@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...runtime.errors import MissingDependencyError
+from ...runtime.io.asset.changes import told
 from ...runtime.io.loops import loops_of
 from ...runtime.options.unwrap import POLYGONS
 from ..checks import exr_settings
@@ -76,9 +77,14 @@ def write_outputs(
     if job.outputs.preview:
         with clock.stage("preview"):
             write_preview(output, job.atlas, job.asset)
-    with_polygons = [piece for piece in pieces or [job] if set(POLYGONS) & set(piece.outputs.formats)]
-    cut = sum(loops_of(piece.atlas, piece.asset).cut for piece in with_polygons)
-    return {"textures": texture_facts(job.atlas, baked), "written": written, "polygons_cut": cut}
+    facts = {"textures": texture_facts(job.atlas, baked), "written": written}
+    return {**facts, "polygons_cut": polygons_cut(pieces or [job])}
+
+
+def polygons_cut(pieces: Sequence[BakeJob]) -> int:
+    """Polygons that are triangles in files of formats that know polygons."""
+    with_polygons = [piece for piece in pieces if set(POLYGONS) & set(piece.outputs.formats)]
+    return sum(loops_of(piece.atlas, piece.asset).cut for piece in with_polygons)
 
 
 def write_reports(output: OutputFolder, job: BakeJob, report: Mapping[str, Any]) -> None:
@@ -208,9 +214,17 @@ def written_notes(written: Mapping[str, Mapping[str, Any]]) -> list[str]:
     ]
 
 
+def with_cut(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The report, in which "polygons_cut" is one of the "changes", where any was."""
+    plain = {name: value for name, value in report.items() if name != "polygons_cut"}
+    cut = {"polygons_cut": report["polygons_cut"]} if report.get("polygons_cut") else {}
+    return {**plain, "changes": {**report["changes"], **cut}}
+
+
 def result_notes(report: Mapping[str, Any]) -> list[str]:
     """What a user should know of what was written: a line each."""
-    return [*written_notes(report["written"]), *texture_notes(report["textures"])]
+    cut = told({"polygons_cut": report["polygons_cut"]})
+    return [*cut, *written_notes(report["written"]), *texture_notes(report["textures"])]
 
 
 def stack_notes(packing: Mapping[str, Any]) -> list[str]:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...runtime.io.asset.changes import told
 from ...runtime.pack.packing import atlas_of_corners
 from ...runtime.pack.pages import tile_corners
 from ..checks import check_outputs, chosen_maps
 from .meshes import MeshJob, write_meshes
-from .output import BakeJob, bake_settings, baking, written_notes
+from .output import BakeJob, bake_settings, baking, polygons_cut, written_notes
 from .udim import udim_tiles
 
 if TYPE_CHECKING:
@@ -50,13 +51,15 @@ def write_tiles(output: OutputFolder, whole: BakeJob, pieces: Sequence[BakeJob],
             facts = write_meshes(output, MeshJob(piece.atlas, piece.asset, piece.outputs, {}, files))
             prefix = f"{piece.asset.stem}." if len(pieces) > 1 else ""
             written |= {f"{prefix}{ending}": found for ending, found in facts.items()}
-    return {"outputs": asdict(whole.outputs), "written": written, "tiles": tiles, "textures": {"files": files}}
+    facts = {"outputs": asdict(whole.outputs), "written": written, "tiles": tiles, "textures": {"files": files}}
+    return {**facts, "polygons_cut": polygons_cut(pieces)}
 
 
 def tile_notes(facts: Mapping[str, Any], stem: str) -> list[str]:
     """What a user should know of written tiles: a line each."""
-    tiles = facts["tiles"]
-    return [f"{stem}: {fact}" for fact in (f"tiles {tiles[0]} to {tiles[-1]}", *written_notes(facts["written"]))]
+    tiles, cut = facts["tiles"], told({"polygons_cut": facts["polygons_cut"]})
+    found = (f"tiles {tiles[0]} to {tiles[-1]}", *cut, *written_notes(facts["written"]))
+    return [f"{stem}: {fact}" for fact in found]
 
 
 def tiled_job(asset: Asset, tile: NDArray[np.int64], atlases: Sequence[Atlas], outputs: Outputs, seed: int) -> BakeJob:

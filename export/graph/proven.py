@@ -1,4 +1,4 @@
-"""What both exported maps share: the kind of file, and writing once a proof has passed."""
+"""What all exported maps share: the kind of file, and writing once a proof has passed."""
 
 from __future__ import annotations
 
