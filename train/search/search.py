@@ -61,14 +61,15 @@ class Search(State):
 
     def emptied(self) -> Self:
         """A search of the same surface without pieces."""
-        fresh = copy(self)
-        fresh.pieces, fresh.loose, fresh.tried, fresh.foretold, fresh.settled, fresh._next = {}, [], {}, {}, set(), 0
+        fresh = self.twin()
+        fresh.pieces, fresh.loose, fresh._next = {}, [], 0
         return fresh
 
     def twin(self) -> Self:
         """The same pieces, to be changed for itself."""
         other = copy(self)
-        other.pieces, other.tried, other.foretold, other.settled = dict(self.pieces), {}, {}, set()
+        other.pieces, other.loose = dict(self.pieces), list(self.loose)
+        other.tried, other.foretold, other.settled, other.flattened = {}, {}, set(), 0
         return other
 
     def foretell(self, pair: Pair) -> tuple[float, float]:
