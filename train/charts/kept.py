@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
-from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Frame, Surface
 from ...runtime.pack.config import IslandConfig
 from ...runtime.pack.exact.seamvertices import split_vertices
 from ...runtime.pack.islands import islands_of
-from ..finish.contact import boundary_edges, excess_energy, rim_overlaps
+from ..finish.contact import excess_energy, is_valid
 from ..finish.energies import finished_by
 from ..finish.pieces import Piece
 from ..finish.slits import Flat
@@ -47,7 +46,7 @@ def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
     for number in range(len(charts.method)):
         ids = np.flatnonzero(charts.face_chart == number)
         flat = _as_flat(ball, ids, charts.corner_uv[ids] / frame.scale)
-        valid = _is_valid(flat)
+        valid = is_valid(flat.surface, flat.uv)
         broken += not valid
         flat = _relaxed(flat, config) if valid else flat
         pieces.append(Piece(ids, flat, excess_energy(flat.surface, flat.uv) / total, 0.0))
@@ -65,16 +64,8 @@ def _as_flat(ball: Surface, ids: NDArray[np.int64], corner_uv: NDArray[np.float6
     return Flat(Surface(ball.vertices[source], faces), uv, {})
 
 
-def _is_valid(flat: Flat) -> bool:
-    faces = flat.surface.faces
-    flips = flipped_triangles(flat.uv[faces])
-    return not np.any(flips) and not rim_overlaps(faces, boundary_edges(faces), flat.uv)
-
-
 def _relaxed(flat: Flat, config: FinishConfig) -> Flat:
     """The flattening with less distortion, where that leaves it valid."""
     found = flat.relaxed(config.slit.contact)
-    better = np.isfinite(found.uv).all() and excess_energy(flat.surface, found.uv) < excess_energy(
-        flat.surface, flat.uv
-    )
-    return found if better and _is_valid(found) else flat
+    valid = is_valid(found.surface, found.uv)
+    return found if valid and excess_energy(flat.surface, found.uv) < excess_energy(flat.surface, flat.uv) else flat

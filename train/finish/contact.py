@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.geometry.distortion import MOST_EXCESS, excess, oriented_energy
-from ...runtime.geometry.overlap import overlapping_pairs, overlaps_anywhere
+from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table
 from ...runtime.kernel.choice import kernel
 from .flatten import Pins, Slim, jacobians, slim
@@ -104,6 +104,13 @@ def rim_overlaps(faces: NDArray[np.int64], edges: NDArray[np.int64], uv: NDArray
     Two border edges that cross belong to two triangles that overlap, so only the triangles along the border are tested.
     """
     return overlaps_anywhere(uv[faces[rim_faces(faces, edges)]])
+
+
+def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
+    """True for finite uv (v, 2) without flips, whose border does not cross itself: for a disk, no overlap."""
+    if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
+        return False
+    return not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)
 
 
 def rim_faces(faces: NDArray[np.int64], edges: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 import igl
 import numpy as np
 
-from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.triangles import signed_areas
 from ..workers import parallel_map
-from .contact import boundary_edges, excess_energy, rim_overlaps
+from .contact import excess_energy, is_valid
 from .flatten import slim
 
 if TYPE_CHECKING:
@@ -51,9 +50,3 @@ def at_own_area(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64
     """Uv (v, 2) at the area of the surface."""
     area = float(signed_areas(uv[surface.faces]).sum())
     return uv * np.sqrt(float(surface.face_areas().sum()) / area) if area > 0.0 else uv
-
-
-def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
-    """True for finite uv (v, 2) without flips, whose border does not cross itself."""
-    flipped = not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any()
-    return not flipped and not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)

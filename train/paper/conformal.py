@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.triangles import corner_angles, signed_areas
-from ..finish.contact import Relaxed, as_pins, boundary_edges, excess_energy, rim_overlaps, separate
+from ..finish.contact import Relaxed, as_pins, boundary_edges, excess_energy, is_valid, separate
 from ..finish.flatten import CONFORMAL, Slim, slim
 
 if TYPE_CHECKING:
@@ -102,10 +101,3 @@ def at_scale_of(disk: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
 def angle_error(disk: Surface, uv: NDArray[np.float64]) -> float:
     """Mean |angle − uv angle| over the corners of the faces, radians: the paper's conformality."""
     return float(np.abs(corner_angles(disk.triangles) - corner_angles(uv[disk.faces])).mean())
-
-
-def is_valid(surface: Surface, uv: NDArray[np.float64]) -> bool:
-    """No flip, and a border that doesn't cross itself: for a disk, no overlap."""
-    if not np.isfinite(uv).all() or flipped_triangles(uv[surface.faces]).any():
-        return False
-    return not rim_overlaps(surface.faces, boundary_edges(surface.faces), uv)

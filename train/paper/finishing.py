@@ -27,7 +27,7 @@ from ..carry.proxy import simplified
 from ..charts.charts import Finished
 from ..charts.proof import verify
 from ..config import FinishConfig
-from ..finish.contact import Relaxed, excess_energy, relax
+from ..finish.contact import Relaxed, excess_energy, is_valid, relax
 from ..finish.disks import cut_open
 from ..finish.flatten import circle_map
 from ..finish.openings import slit_along
@@ -36,7 +36,7 @@ from ..finish.slits import Flat, Slit, slit_where_it_pays
 from ..search.labels import connected_pieces, dual_graph
 from ..search.search import Search
 from ..workers import parallel_map
-from .conformal import ConformalConfig, conformal_steps, is_valid
+from .conformal import ConformalConfig, conformal_steps
 from .learnedseams import SeamConfig, seam_edges, tears
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from flexpara.runtime.geometry.topology import euler_characteristic
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.finish.contact import excess_energy
+from flexpara.train.finish.contact import excess_energy, is_valid
 from flexpara.train.finish.flatten import slim
-from flexpara.train.paper.conformal import ConformalConfig, angle_error, conformal_steps, is_valid
+from flexpara.train.paper.conformal import ConformalConfig, angle_error, conformal_steps
 from flexpara.train.paper.finishing import (
     GlobalFinish,
     GlobalFinishConfig,
