@@ -19,6 +19,7 @@ from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carry_piece
 from ..carry.layout import nearest_faces
 from ..finish.contact import boundary_edges, rim_overlaps
+from ..finish.flatten import at_own_area
 from ..finish.pieces import Overlapping, measured
 from ..finish.slits import Flat
 from ..search.labels import connected_pieces, dual_graph
@@ -89,11 +90,9 @@ def made_valid(surface: Surface, corner_uv: Corners, config: FinishConfig) -> Se
 
 
 def sized(piece: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Uv (v, 2) of the piece's own area, turned over where they are mirrored; as they are where they have none."""
-    area = float(signed_areas(uv[piece.faces]).sum())
-    if area == 0.0 or not np.isfinite(area):
-        return uv
-    return uv * np.array([np.sign(area), 1.0]) * np.sqrt(float(piece.face_areas().sum()) / abs(area))
+    """Uv (v, 2) of the piece's own area, turned over where they are mirrored."""
+    mirrored = signed_areas(uv[piece.faces]).sum() < 0.0
+    return at_own_area(piece, uv * np.array([-1.0, 1.0]) if mirrored else uv)
 
 
 def add_island(search: Search, ids: NDArray[np.int64], flat: Flat) -> None:

@@ -10,17 +10,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import igl
-import numpy as np
 
-from ...runtime.geometry.triangles import signed_areas
 from ..workers import parallel_map
 from .contact import excess_energy, is_valid
-from .flatten import slim
+from .flatten import at_own_area, slim
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ...runtime.mesh import Surface
     from .config import EnergyConfig
     from .pieces import Piece
 
@@ -44,9 +39,3 @@ def by_energy(piece: Piece, total_area: float, config: EnergyConfig) -> Piece | 
             energy = excess_energy(surface, uv) / total_area
             return replace(piece, flat=piece.flat._replace(uv=uv), energy=energy)
     return None
-
-
-def at_own_area(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Uv (v, 2) at the area of the surface."""
-    area = float(signed_areas(uv[surface.faces]).sum())
-    return uv * np.sqrt(float(surface.face_areas().sum()) / area) if area > 0.0 else uv

@@ -52,6 +52,12 @@ def circle_map(surface: Surface, loop: NDArray[np.int64]) -> NDArray[np.float64]
     return uv * np.sqrt(surface.face_areas().sum() / np.pi)
 
 
+def at_own_area(surface: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Uv (v, 2) at the area of the surface; as they are where they have none."""
+    area = float(np.abs(triangles.signed_areas(uv[surface.faces])).sum())
+    return uv * np.sqrt(float(surface.face_areas().sum()) / area) if 0.0 < area < np.inf else uv
+
+
 def tutte_map(surface: Surface, loop: NDArray[np.int64], boundary: NDArray[np.float64]) -> NDArray[np.float64]:
     """Each inner vertex at the mean of its neighbours; the loop (b,) at boundary (b, 2); NaN where none leads to it."""
     count = len(surface.vertices)

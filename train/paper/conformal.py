@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.geometry.triangles import corner_angles, signed_areas
+from ...runtime.geometry.triangles import corner_angles
 from ..finish.contact import Relaxed, as_pins, boundary_edges, excess_energy, is_valid, separate
-from ..finish.flatten import CONFORMAL, Slim, slim
+from ..finish.flatten import CONFORMAL, Slim, at_own_area, slim
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def conformal_steps(
     for _ in range(config.iterations // config.block):
         if best is uv and angle_error(disk, best) < config.enough:
             return best
-        uv = at_scale_of(disk, solver.run(config.block))
+        uv = at_own_area(disk, solver.run(config.block))
         if excess_energy(disk, uv) > most_energy:
             break
         if is_valid(disk, uv):
@@ -74,7 +74,7 @@ def conformal_contacts(
         apart = separate(disk, Relaxed(moved, state.pins), edges, contact, partial(conformal_step, disk, contact))
         if apart is None:
             break
-        state, uv = apart, at_scale_of(disk, apart.uv)
+        state, uv = apart, at_own_area(disk, apart.uv)
         if not is_valid(disk, uv) or excess_energy(disk, uv) > most_energy:
             break
         best = uv
@@ -91,11 +91,6 @@ def conformal_step(
 def highest_energy(disk: Surface, start: NDArray[np.float64], config: ConformalConfig) -> float:
     """The excess energy up to which distortion of area is accepted for better angles."""
     return config.growth * excess_energy(disk, start) + config.allowance * float(disk.face_areas().sum())
-
-
-def at_scale_of(disk: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The uv (v, 2) with the area of the disk."""
-    return uv * np.sqrt(disk.face_areas().sum() / np.abs(signed_areas(uv[disk.faces])).sum())
 
 
 def angle_error(disk: Surface, uv: NDArray[np.float64]) -> float:
