@@ -57,9 +57,10 @@ class Improved(NamedTuple):
 
 def given_charts(parts: list[Part], corner_uv: Corners | None, config: FinishConfig) -> dict[int, Search]:
     """The atlas given to each part by its number, made valid; of a copy on the part that it is a copy of."""
+    if corner_uv is None:
+        return {}
     found = {}
-    for number, part in enumerate(parts if corner_uv is not None else []):
-        assert corner_uv is not None
+    for number, part in enumerate(parts):
         first = part if part.copy_of < 0 else parts[part.copy_of]
         own = corner_uv[part.ids]
         if part.mirrored:
@@ -114,10 +115,7 @@ def as_start(given: Search, surface: Surface, graph: DualGraph) -> NDArray[np.in
 
 def improved(given: Search, late: Late = never) -> Search:
     """The same charts, each with less distortion, their seams straight where the surface is not too large for it."""
-    config = given.config
-    found = Search(given.surface, given.graph, config)
-    for piece in given.pieces.values():
-        found.add(piece)
+    config, found = given.config, given.twin()
     found.polish()
     few = len(given.surface.faces) <= config.fine.above * config.fine.faces
     return with_straight_arcs(found, config.arcs, late) if few and not late() else found
