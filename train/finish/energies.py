@@ -1,7 +1,7 @@
 """Charts finished by another energy than the search's: angles alone, or rigidity.   A chart that would overlap stays.
 
-isometric: symmetric Dirichlet, σ² + 1/σ² · conformal: (σ₁² + σ₂²) / 2σ₁σ₂, each chart then at the area of its surface ·
-arap: Σ (σ − 1)², for the singular values σ of a face's derivative.
+isometric: symmetric Dirichlet, σ² + 1/σ² · conformal: (σ₁² + σ₂²) / 2σ₁σ₂ · arap: Σ (σ − 1)², for the singular values
+σ of a face's derivative.  Each chart finished by one of the latter is then put at the area of its surface.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import igl
 
 from ..workers import parallel_map
 from .contact import excess_energy, is_valid
-from .flatten import at_own_area, slim
+from .flatten import CONFORMAL, at_own_area, slim
 
 if TYPE_CHECKING:
     from .config import EnergyConfig
     from .pieces import Piece
 
-KINDS = {"conformal": igl.MappingEnergyType.CONFORMAL, "arap": igl.MappingEnergyType.ARAP}
+KINDS = {"conformal": CONFORMAL, "arap": igl.MappingEnergyType.ARAP}
 
 
 def finished_by(pieces: list[Piece], total_area: float, config: EnergyConfig) -> tuple[list[Piece], int]:
     """The charts by the energy asked for, and how many stay by the search's, since they would lie over themselves."""
-    if config.kind not in KINDS:
+    if config.kind == "isometric":
         return pieces, 0
     found = parallel_map(lambda piece: by_energy(piece, total_area, config), pieces)
     return [new or old for new, old in zip(found, pieces, strict=True)], sum(new is None for new in found)
