@@ -73,10 +73,11 @@ class Solved(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What the parts of a surface are charted by; given: atlases to improve, by part."""
+    """What the parts of a surface are charted by; total: their area.  given: atlases to improve, by part."""
 
     surface: Surface
     parts: list[Part]
+    total: float
     charts: int
     config: FinishConfig
     seed: int
@@ -98,12 +99,11 @@ class Work:
 
     def plain(self, part: Part, config: FinishConfig, bound: Search | None) -> Solved:
         """Charts as they come, those too long for the page cut; bound: an atlas to start from."""
-        total = sum(each.scale**2 for each in self.parts)
-        share, most = part.scale**2 / total, config.closing.charts
+        share, most = part.scale**2 / self.total, config.closing.charts
         starts = Starts(part, most, share, config, self.seed, self.known.scores, self.late, bound)
         solved = solve_part(part.surface, self.charts, starts, config)
         polygon = None if self.surface.polygon is None else self.surface.polygon[part.ids]
-        page = Page(float(np.sqrt(total)) / part.scale, self.charts, polygon)
+        page = Page(float(np.sqrt(self.total)) / part.scale, self.charts, polygon)
         if config.stretch:
             return solved
         return solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
@@ -149,8 +149,7 @@ def chart_surface(
     late = partial(stage.deadline.passed, config.haste.seconds + config.haste.seconds_per_face * len(surface.faces))
     given = given_charts(parts, known.corner_uv, config)
     first = [number for number, part in enumerate(parts) if part.copy_of < 0]
-
-    work = Work(surface, parts, charts, config, seed, stage, known, given, late)
+    work = Work(surface, parts, total, charts, config, seed, stage, known, given, late)
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
     apart = int(2 * len(parts[largest_first[0]].ids) > sum(len(parts[number].ids) for number in first))
