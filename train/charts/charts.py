@@ -73,7 +73,7 @@ class Solved(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What the parts of a surface are charted by; total: their area.  given: atlases to improve, by part."""
+    """What the parts of a surface are charted by; total: their area.  given: atlases to improve, one a part."""
 
     surface: Surface
     parts: list[Part]
@@ -91,7 +91,7 @@ class Work:
         part, config = self.parts[number], self.config
         part = part._replace(surface=steadied(part.surface, config.sliver))
         own = priced(config, config.slit.seams.moved(part.origin, part.scale))
-        bound = best_of_copies(self.given, self.parts, number, self.charts)
+        bound = self.given.get(number)
         solved = self.mirrored(part, own, bound) if config.symmetry.axis != "none" else self.plain(part, own, bound)
         if bound is None:
             return solved
@@ -149,7 +149,8 @@ def chart_surface(
     late = partial(stage.deadline.passed, config.haste.seconds + config.haste.seconds_per_face * len(surface.faces))
     given = given_charts(parts, known.corner_uv, config)
     first = [number for number, part in enumerate(parts) if part.copy_of < 0]
-    work = Work(surface, parts, total, charts, config, seed, stage, known, given, late)
+    bounds = best_of_copies(given, parts, charts)
+    work = Work(surface, parts, total, charts, config, seed, stage, known, bounds, late)
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
     apart = int(2 * len(parts[largest_first[0]].ids) > sum(len(parts[number].ids) for number in first))

@@ -121,10 +121,16 @@ def improved(given: Search, late: Late = never) -> Search:
     return with_straight_arcs(found, config.arcs, late) if few and not late() else found
 
 
-def best_of_copies(given: dict[int, Search], parts: list[Part], number: int, charts: int) -> Search | None:
-    """The best of the atlases given to a part and to its copies; None where none were given."""
-    own = [given[at] for at, part in enumerate(parts) if number in (at, part.copy_of)] if given else []
-    return min(own, key=lambda each: rank(list(each.pieces.values()), each.surface, charts, each.config), default=None)
+def best_of_copies(given: dict[int, Search], parts: list[Part], charts: int) -> dict[int, Search]:
+    """The best of the atlases given to each part and to its copies, by the part's number."""
+    alike: dict[int, list[Search]] = {}
+    for at, each in given.items():
+        alike.setdefault(at if parts[at].copy_of < 0 else parts[at].copy_of, []).append(each)
+
+    def place(each: Search) -> tuple[bool, bool, float]:
+        return rank(list(each.pieces.values()), each.surface, charts, each.config)
+
+    return {number: min(several, key=place) for number, several in alike.items()}
 
 
 def no_worse(found: list[Piece], given: Search, charts: int, config: FinishConfig, late: Late = never) -> list[Piece]:
