@@ -122,8 +122,7 @@ def placed(piece: Piece, part: Part, surface: Surface, total: float) -> Piece:
     if part.mirrored:
         uv, faces = uv * [-1.0, 1.0], faces[:, [0, 2, 1]]
     vertices = np.zeros((len(uv), 3))
-    corner = faces if not part.mirrored else piece.flat.surface.faces[:, [0, 2, 1]]
-    vertices[corner.reshape(-1)] = surface.vertices[surface.faces[ids]].reshape(-1, 3)
+    vertices[faces.reshape(-1)] = surface.vertices[surface.faces[ids]].reshape(-1, 3)
     share = part.scale**2 / total
     return replace(
         piece,
