@@ -259,13 +259,4 @@ def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishCon
 
 def as_piece(surface: Surface, development: Development) -> Piece:
     """A development as a piece: its corners are one vertex where they are in space and in the plane."""
-    corner = surface.faces[development.ids].reshape(-1)
-    uv = development.uv.reshape(-1, 2)
-    order = np.lexsort((uv[:, 1], uv[:, 0], corner))
-    fresh = np.ones(len(order), dtype=bool)
-    fresh[1:] = (corner[order][1:] != corner[order][:-1]) | (uv[order][1:] != uv[order][:-1]).any(axis=1)
-    index = np.zeros(len(order), dtype=np.int64)
-    index[order] = np.cumsum(fresh) - 1
-    first = order[fresh]
-    flat = Flat(Surface(surface.vertices[corner[first]], index.reshape(-1, 3)), uv[first], {})
-    return measured(surface, development.ids, flat, 1.0)
+    return measured(surface, development.ids, Flat.of(surface, development.ids, development.uv), 1.0)

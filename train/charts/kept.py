@@ -13,7 +13,6 @@ from ...runtime.errors import InputError
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Frame, Surface
 from ...runtime.pack.config import IslandConfig
-from ...runtime.pack.exact.seamvertices import split_vertices
 from ...runtime.pack.islands import islands_of
 from ..finish.contact import excess_energy, is_valid
 from ..finish.energies import finished_by
@@ -45,7 +44,7 @@ def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
     total, pieces, broken = float(ball.face_areas().sum()), list[Piece](), 0
     for number in range(len(charts.method)):
         ids = np.flatnonzero(charts.face_chart == number)
-        flat = _as_flat(ball, ids, charts.corner_uv[ids] / frame.scale)
+        flat = Flat.of(ball, ids, _turned(charts.corner_uv[ids] / frame.scale))
         valid = is_valid(flat.surface, flat.uv)
         broken += not valid
         flat = _relaxed(flat, config) if valid else flat
@@ -56,12 +55,9 @@ def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
     return Finished(pieces, sum(piece.energy for piece in pieces), {"kept": len(pieces)}, notes)
 
 
-def _as_flat(ball: Surface, ids: NDArray[np.int64], corner_uv: NDArray[np.float64]) -> Flat:
-    """Faces with uv (m, 3, 2) of their corners, each vertex once for each uv it has; not mirrored."""
-    if signed_areas(corner_uv).sum() < 0.0:
-        corner_uv = corner_uv * (-1.0, 1.0)
-    faces, source, uv = split_vertices(ball.faces[ids], np.zeros(len(ids), np.int64), corner_uv)
-    return Flat(Surface(ball.vertices[source], faces), uv, {})
+def _turned(corner_uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Uv (m, 3, 2) turned over where they are mirrored."""
+    return corner_uv * (-1.0, 1.0) if signed_areas(corner_uv).sum() < 0.0 else corner_uv
 
 
 def _relaxed(flat: Flat, config: FinishConfig) -> Flat:

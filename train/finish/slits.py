@@ -14,6 +14,7 @@ from scipy import sparse
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.mesh import Surface
+from ...runtime.pack.exact.seamvertices import split_vertices
 from .contact import Relaxed, excess_energy, relax
 from .curvature import Curvature, foretold_energies
 from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
@@ -33,6 +34,12 @@ class Flat(NamedTuple):
     surface: Surface
     uv: NDArray[np.float64]
     pins: dict[int, NDArray[np.float64]]
+
+    @classmethod
+    def of(cls, surface: Surface, ids: NDArray[np.int64], corner_uv: NDArray[np.float64]) -> Flat:
+        """Faces ids (m,) with uv (m, 3, 2) of their corners, each vertex once for each uv it has."""
+        faces, source, uv = split_vertices(surface.faces[ids], np.zeros(len(ids), np.int64), corner_uv)
+        return cls(Surface(surface.vertices[source], faces), uv, {})
 
     def relaxed(self, config: ContactConfig, *, goal: float = np.inf) -> Flat:
         """The piece after SLIM, still valid; unchanged where the goal (excess energy) is out of sight."""
