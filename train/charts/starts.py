@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import compress
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -107,7 +107,7 @@ class Starts:
             return start.counts_small
         return start.counts if self.share >= start.main else start.counts_middle
 
-    def clusters(self, counts: tuple[float, ...], faces: int) -> tuple[int, ...]:
+    def cluster_counts(self, counts: tuple[float, ...], faces: int) -> tuple[int, ...]:
         """How many clusters each start of a proxy of so many faces has."""
         least = max(round(self.handles / self.config.handles_per_cluster), 1)
         most = max(faces // self.config.start.least_faces, 1)
@@ -153,7 +153,7 @@ def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: t
 
     Where the first has so many pieces that it takes its time, it is the only one: another would not be much better.
     """
-    sizes = starts.clusters(counts if starts.scores is None else counts[:1], len(surface.faces))
+    sizes = starts.cluster_counts(counts if starts.scores is None else counts[:1], len(surface.faces))
 
     def laid(number: int) -> Search:
         return laid_out(surface, graph, starts.labels(surface, graph, sizes[number], number), starts.config)
@@ -161,8 +161,8 @@ def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: t
     first = laid(0)
     if starts.late() or len(first.pieces) > starts.config.start.crowded:
         return [first.begin(starts.late)]
-    begun = [lambda: first, *(partial(laid, number) for number in range(1, len(sizes)))]
-    return parallel_map(lambda n: begun[n]().begin(starts.late), range(len(sizes)), lambda n: sizes[n])
+    numbers = range(len(sizes))
+    return parallel_map(lambda n: (laid(n) if n else first).begin(starts.late), numbers, lambda n: sizes[n])
 
 
 def laid_out(surface: Surface, graph: DualGraph, label: NDArray[np.int64], config: FinishConfig) -> Search:
