@@ -51,14 +51,19 @@ class Mirror(NamedTuple):
 
     def image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (…, 3) mirrored."""
-        sign, shift = np.ones(3), np.zeros(3)
-        sign[self.axis], shift[self.axis] = -1.0, 2.0 * self.middle
-        return points * sign + shift
+        return _image(points, self.axis, self.middle)
 
     @property
     def unlike(self) -> int:
         """Faces beyond the plane that are no mirror image."""
         return int(np.count_nonzero((self.like >= 0) & ~self.exact))
+
+
+def _image(points: NDArray[np.float64], axis: int, middle: float) -> NDArray[np.float64]:
+    """Points (…, 3) mirrored in a plane across an axis."""
+    image = points.copy()
+    image[..., axis] = 2.0 * middle - points[..., axis]
+    return image
 
 
 def mirror_of(surface: Surface, config: SymmetryConfig) -> Mirror | None:
@@ -71,8 +76,7 @@ def mirror_of(surface: Surface, config: SymmetryConfig) -> Mirror | None:
     for axis in axes:
         column = points[:, axis]
         for middle in (float(column.mean()), float(column.min() + column.max()) / 2.0):
-            image = points.copy()
-            image[:, axis] = 2.0 * middle - column
+            image = _image(points, axis, middle)
             distance = tree.query(image, distance_upper_bound=2.0 * reach * size)[0]
             found.append((float(np.mean(distance <= reach * size)), axis, middle))
     best = max(found, key=lambda entry: entry[0])
@@ -88,14 +92,13 @@ def _mirror(surface: Surface, axis: int, middle: float, reach: float) -> Mirror 
         return None
     like, exact = np.full(len(places), -1, dtype=np.int64), np.zeros(len(places), dtype=bool)
     turn = np.zeros((len(places), 3), dtype=np.int64)
-    bare = Mirror(axis, middle, half, like, exact, turn)
-    like[rest] = KDTree(places[half]).query(bare.image(places[rest]))[1]
-    distance, twin = KDTree(surface.vertices).query(bare.image(surface.vertices))
+    like[rest] = KDTree(places[half]).query(_image(places[rest], axis, middle))[1]
+    distance, twin = KDTree(surface.vertices).query(_image(surface.vertices, axis, middle))
     twin = np.where(distance <= reach, twin, -1)
     own, other = surface.faces[rest], twin[surface.faces[half[like[rest]]]]
     same = own[:, :, None] == other[:, None, :]
     exact[rest], turn[rest] = same.any(axis=2).all(axis=1), same.argmax(axis=2)
-    return bare
+    return Mirror(axis, middle, half, like, exact, turn)
 
 
 def mirrored_charts(
