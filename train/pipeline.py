@@ -97,8 +97,8 @@ def with_networks(
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     charts = as_charts(ball, finished)
-    # the unit ball's charts, at the scale of the source: uv in source units
     density = densities(ball, charts, important, config.importance)
+    # the unit ball's charts, at the scale of the source: uv in source units, more where texels are asked for
     charts = replace(charts, corner_uv=charts.corner_uv * (frame.scale * density[charts.face_chart, None, None]))
     fitted = Beside(partial(fit_networks, ball, charts, config.fit, config.seed))
     report = {

@@ -15,15 +15,15 @@ from ...runtime.cores import core_count
 from ..finish.arap import RigidSteps, nearest_rotations
 from ..finish.flatten import jacobians
 
-MANY = 50_000
-"""Faces from which on several threads look for what is near; what they find is the same."""
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
     from ..config import CarryConfig
     from ..finish.slits import Flat
+
+MANY = 50_000
+"""Faces from which on several threads look for what is near; what they find is the same."""
 
 
 def features(surface: Surface, config: CarryConfig) -> NDArray[np.float64]:
