@@ -55,6 +55,11 @@ class Surface:
         """(f, 3) float64 unit normals, right-handed (zero for a face of zero area)."""
         return triangle_normals(self.triangles)
 
+    def part(self, rows: NDArray[np.int64]) -> tuple[Surface, NDArray[np.int64]]:
+        """The faces rows (m,) by themselves, and which vertices (w,) theirs are, ascending; their polygons are lost."""
+        used, index = np.unique(self.faces[rows], return_inverse=True)
+        return Surface(self.vertices[used], index.reshape(-1, 3)), used
+
 
 @dataclass(frozen=True)
 class Frame:

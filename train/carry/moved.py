@@ -44,8 +44,8 @@ def as_others_lead(
         return uv
     if not stays[beside].all():
         return None
-    used, local = np.unique(disk.faces[moved], return_inverse=True)
-    patch, held = Surface(disk.vertices[used], local.reshape(-1, 3)), np.flatnonzero(known[used])
+    patch, used = disk.part(moved)
+    held = np.flatnonzero(known[used])
     lead = Surface(source.flat.surface.vertices, source.flat.surface.faces[row[beside]])
     turn = carried_jacobians(patch, Flat(lead, source.flat.uv, {}), np.arange(len(moved)))
     rigid = RigidSteps(patch, pins=Pins(held, uv[used[held]], config.hold))

@@ -79,12 +79,11 @@ def made_valid(surface: Surface, corner_uv: Corners, config: FinishConfig) -> Se
     island, seam = uv_charts(surface.faces, corner_uv, table)
     search = Search(surface, dual_graph(surface, table, config.labels.seams), config)
     faces, old = split_non_manifold_vertices(surface.faces, seam, table)
-    uv = np.zeros((len(old), 2))
+    opened, uv = Surface(surface.vertices[old], faces), np.zeros((len(old), 2))
     uv[faces.reshape(-1)] = corner_uv.reshape(-1, 2)
     for number in range(int(island.max()) + 1):
         ids = np.flatnonzero(island == number)
-        used, local = np.unique(faces[ids], return_inverse=True)
-        piece = Surface(surface.vertices[old[used]], local.reshape(-1, 3))
+        piece, used = opened.part(ids)
         add_island(search, ids, Flat(piece, sized(piece, uv[used]), {}))
     search.place_loose()
     return search

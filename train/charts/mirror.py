@@ -108,8 +108,7 @@ def mirrored_charts(
 
     solve: (surface, most charts, config) → charts of a half, proven.
     """
-    used, faces = np.unique(surface.faces[mirror.half], return_inverse=True)
-    half = Surface(surface.vertices[used], faces.reshape(-1, 3))
+    half, _ = surface.part(mirror.half)
     area = float(half.face_areas().sum())
     # the half counts its seams in its own √area, and they will be there twice
     slit = replace(config.slit, price=config.slit.price * 2.0 * float(np.sqrt(area)))

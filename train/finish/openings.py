@@ -114,8 +114,7 @@ def path_along(work: Slitting, slit: Slit, config: SlitConfig) -> list[int]:
     """The cheapest way between a slit's ends, from the inner one to the border; fewer than two vertices for none."""
     for reach in (config.astray * slit.step, config.reach * slit.step, np.inf):
         rows = work.around(slit, reach)
-        vertex, index = np.unique(work.surface.faces[rows], return_inverse=True)
-        near = Surface(work.surface.vertices[vertex], index.reshape(-1, 3))
+        near, vertex = work.surface.part(rows)
         border = np.flatnonzero(work.border[vertex])
         # a vertex near enough to an end would be among these
         if (work.border.any() and not len(border)) or is_astray(near, border, slit, config):

@@ -116,10 +116,9 @@ def laid_out(
 
 def seen_from(part: Surface, rows: NDArray[np.int64], way: NDArray[np.float64]) -> Flat:
     """Faces (n,) in the plane across a direction, at the size that they have in space."""
-    used, corner = np.unique(part.faces[rows], return_inverse=True)
     first = np.cross(way, np.eye(3)[np.abs(way).argmin()])
     first /= np.linalg.norm(first)
-    own = Surface(part.vertices[used], corner.reshape(-1, 3))
+    own, _ = part.part(rows)
     uv = own.vertices @ np.stack([first, np.cross(way, first)], axis=1)
     area = own.face_areas().sum() / max(float(own.face_cross().sum(axis=0) @ way) / 2.0, 1e-300)
     return Flat(own, uv * np.sqrt(area), {})

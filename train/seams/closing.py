@@ -219,10 +219,7 @@ def opened_along(
     search: Search, ids: NDArray[np.int64], seam: NDArray[np.bool_]
 ) -> tuple[Surface, tuple[Slit, ...]] | None:
     """Faces cut along a mask (e,) of the surface's edges, and the slits that are; None where that is no disk."""
-    surface = search.surface
-    faces = surface.faces[ids]
-    used, local = np.unique(faces, return_inverse=True)
-    whole = Surface(surface.vertices[used], local.reshape(-1, 3))
+    whole, _ = search.surface.part(ids)
     table = edge_table(whole.faces)
     source = np.zeros(len(table.edges), dtype=np.int64)
     source[table.face_edges.reshape(-1)] = search.table.face_edges[ids].reshape(-1)
