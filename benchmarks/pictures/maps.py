@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 import flexpara
-from benchmarks.pictures.sheets import FOLDER, QUALITY
+from benchmarks.pictures.sheets import keep
 from flexpara.bake.colors.color import srgb_bytes_from_linear
 from flexpara.bake.maps.catalogue import all_maps
 from flexpara.bake.maps.rays import RaySettings
@@ -83,16 +83,11 @@ def maps(models: Path) -> None:
         side = image.width * shown.crop
         low, high = (image.width - side) / 2.0, (image.width + side) / 2.0
         way = Image.Resampling.NEAREST if shown.crop < 1.0 else Image.Resampling.LANCZOS
-        image.resize((PANEL, PANEL), way, box=(low, low, high, high)).save(
-            FOLDER / f"map-{shown.name}.webp", quality=QUALITY, method=6
-        )
-        print(f"map-{shown.name}", flush=True)
+        keep(f"map-{shown.name}", image.resize((PANEL, PANEL), way, box=(low, low, high, high)))
     with tempfile.TemporaryDirectory() as folder:
         written = result.save(folder, maps=("chart",), background=BACKGROUND)
         image = Image.open(next(path for path in written if path.name.endswith("_chart.png"))).convert("RGB")
-    image.resize((PANEL, PANEL), Image.Resampling.LANCZOS).save(
-        FOLDER / "map-background.webp", quality=QUALITY, method=6
-    )
+    keep("map-background", image.resize((PANEL, PANEL), Image.Resampling.LANCZOS))
 
 
 def seen(texture: Texture, *, signed: bool) -> NDArray[np.uint8]:

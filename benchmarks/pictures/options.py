@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from trimesh.visual import TextureVisuals
 
 import flexpara
-from benchmarks.pictures.sheets import FOLDER, PANEL, QUALITY, WIDTH, Column, foot, save, sheet
+from benchmarks.pictures.sheets import PANEL, Column, foot, keep, save, sheet
 from flexpara.__main__ import main as command
 from flexpara.bake.colors.color import chart_colors, srgb_bytes_from_linear
 from flexpara.bake.pictures.canvas import draw
@@ -224,10 +224,7 @@ def whole_texels(inputs: Inputs) -> None:
             pen.line([(0, place), (side, place)], fill=(150, 150, 150))
         images.append(np.asarray(image.resize((PANEL, PANEL), Image.Resampling.LANCZOS)))
     gap = np.full((PANEL, 20, 3), 255, np.uint8)
-    Image.fromarray(np.concatenate([images[0], gap, images[1]], axis=1)).save(
-        FOLDER / "whole-texels.webp", quality=QUALITY, method=6
-    )
-    print("whole-texels", flush=True)
+    keep("whole-texels", Image.fromarray(np.concatenate([images[0], gap, images[1]], axis=1)))
 
 
 def high(inputs: Inputs) -> None:
@@ -247,10 +244,7 @@ def high(inputs: Inputs) -> None:
         line = words.replace(str(fine), fine.name) or "the coarse mesh alone"
         below = Image.fromarray(srgb_bytes_from_linear(foot(line)))
         panels.append(np.concatenate([np.asarray(image), np.asarray(below)]))
-    image = Image.fromarray(np.concatenate(panels, axis=1))
-    image.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
-    image.save(FOLDER / "high.webp", quality=QUALITY, method=6)
-    print("high", flush=True)
+    keep("high", Image.fromarray(np.concatenate(panels, axis=1)))
 
 
 OTHERS: Mapping[str, Callable[[Inputs], None]] = {

@@ -51,11 +51,16 @@ class Column:
 
 def save(name: str, pixels: NDArray[np.floating]) -> None:
     """Linear light (h, w, 3) as a small WebP file."""
-    image = Image.fromarray(srgb_bytes_from_linear(np.ascontiguousarray(pixels, np.float32)))
+    keep(name, Image.fromarray(srgb_bytes_from_linear(np.ascontiguousarray(pixels, np.float32))))
+
+
+def keep(name: str, image: Image.Image) -> None:
+    """An image, no larger than a sheet, as a file of that name."""
+    path = FOLDER / f"{name}.webp"
     image.thumbnail((WIDTH, WIDTH), Image.Resampling.LANCZOS)
     FOLDER.mkdir(exist_ok=True)
-    image.save(FOLDER / f"{name}.webp", quality=QUALITY, method=6)
-    print(f"{name}: {(FOLDER / f'{name}.webp').stat().st_size // 1024} KiB", flush=True)
+    image.save(path, quality=QUALITY, method=6)
+    print(f"{name}: {path.stat().st_size // 1024} KiB", flush=True)
 
 
 def foot(*lines: str, width: int = PANEL) -> NDArray[np.float32]:
