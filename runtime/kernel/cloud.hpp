@@ -21,11 +21,15 @@ struct Cloud {
     Index neighbour(std::size_t i, std::size_t j) const { return neighbours[i * k + j]; }
 };
 
+constexpr std::size_t kShare = 4096;  // points that a thread takes at a time
+
+inline int share_count(std::size_t count) { return int((count + kShare - 1) / kShare); }
+
 template <class Work>
 void each_point(std::size_t count, int threads, Work work) {
-    constexpr std::size_t size = 4096;
-    const int pieces = int((count + size - 1) / size);
-    Team(std::min(threads, pieces)).each(pieces, [&](int piece) { work(piece, piece * size, std::min(count, (piece + 1) * size)); });
+    Team(std::min(threads, share_count(count))).each(share_count(count), [&](int piece) {
+        work(piece, piece * kShare, std::min(count, (piece + 1) * kShare));
+    });
 }
 
 // Unit normals (d, 3), of either sign, of planes through each point's first `wide` neighbours and itself.
@@ -155,7 +159,7 @@ class Star {
 // (t, 3) triangles of all stars, those of a point one after the other.
 inline std::vector<Index> stars(const Cloud& cloud, const double* across, const double* along, const double* normals,
                                 const StarRules& rules, int threads) {
-    std::vector<std::vector<Index>> parts(cloud.count / 4096 + 1);
+    std::vector<std::vector<Index>> parts(share_count(cloud.count));
     each_point(cloud.count, threads, [&](int piece, std::size_t first, std::size_t end) {
         Star star(cloud.k);
         for (std::size_t i = first; i < end; ++i) star.collect(cloud, Index(i), across, along, normals, rules, parts[piece]);
