@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .runtime import aliases as _aliases  # noqa: F401  # `import flexpara.xatlas` is found through it
-from .runtime import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.errors import FlexparaError
+from .runtime.process import forks as _forks  # noqa: F401  # it has to be there before a process is forked
 from .runtime.saving import Unwrapping
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from .runtime.mesh import Asset, Atlas, Charts, Frame
     from .runtime.options.pack import PackOptions as PackOptions
     from .runtime.options.unwrap import Options, Outputs
-    from .runtime.progress import Progress
+    from .runtime.process.progress import Progress
     from .runtime.sessions.session import UnwrapSession
     from .train.deploy.gated import GatedExperts
 
@@ -85,12 +85,12 @@ def unwrap(
         MissingDependencyError: the packages of flexpara[unwrap] are absent.
         FinishError, ParityError: no valid atlas could be made, or its network could not be exported faithfully.
     """
-    from .runtime.deadline import Deadline
     from .runtime.io.anyfile import load_any
     from .runtime.io.points.cloud import PointCloud
     from .runtime.options.keywords import from_keywords
     from .runtime.options.unwrap import Options, demand
-    from .runtime.progress import Clock
+    from .runtime.process.deadline import Deadline
+    from .runtime.process.progress import Clock
 
     options = from_keywords(Options, options, keywords)
     demand(not options.several, "several atlases in unwrap, expected one; call unwrap_pages")
@@ -121,7 +121,7 @@ def unwrap_asset(
 ) -> UnwrapResult:
     """Train, finish, pack, measure, export.  keep: folder and interval of checkpoints.  Raises as `unwrap`."""
     from .runtime.extras import requires
-    from .runtime.progress import Clock
+    from .runtime.process.progress import Clock
 
     with requires("unwrap"):
         from .export.whole import unwrapped
@@ -135,7 +135,7 @@ def unwrap_asset_pages(asset: Asset, options: Options, progress: Progress | None
     """The asset's pages, shaded as one mesh, each as `unwrap_asset`.  Raises: as that."""
     from .runtime.extras import requires
     from .runtime.io.asset.shading import shaded
-    from .runtime.progress import Clock
+    from .runtime.process.progress import Clock
 
     with requires("bake"):
         from .bake.files.gltfmade import with_document
@@ -155,7 +155,7 @@ def unwrap_cloud(
     Raises: as `unwrap`; MeshError where the points show no surface.
     """
     from .runtime.extras import requires
-    from .runtime.progress import Clock
+    from .runtime.process.progress import Clock
 
     with requires("unwrap"):
         from .export.whole import unwrapped_cloud
@@ -255,7 +255,7 @@ class UnwrapResult(Unwrapping):
         from .export.assemble import write_networks
         from .runtime.io.asset.changes import lost
         from .runtime.io.points.written import point_files, write_points
-        from .runtime.progress import Clock
+        from .runtime.process.progress import Clock
 
         outputs = outputs.for_asset(self.asset)
         outputs = outputs if self.cloud is None else outputs.for_points()
@@ -309,7 +309,7 @@ class UnwrapPages(Unwrapping):
         from .bake.results.output import with_cut
         from .bake.results.several import Several
         from .export.assemble import write_networks
-        from .runtime.progress import Clock
+        from .runtime.process.progress import Clock
 
         clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
         pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]

@@ -25,18 +25,18 @@ from .bake.commands import bake
 from .bake.repack.commands import pack
 from .bake.report.commands import report
 from .runtime.batch.commands import batch
-from .runtime.commands import evaluate, query, sample
-from .runtime.console import Console, Manners, complain
-from .runtime.deadline import Deadline, interrupts_ask
+from .runtime.cli.commands import evaluate, query, sample
+from .runtime.cli.console import Console, Manners, complain
+from .runtime.cli.inputs import STREAM, from_stdin, meshes_of
+from .runtime.cli.runfile import Run
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
-from .runtime.heap import keep_freed_memory
-from .runtime.inputs import STREAM, from_stdin, meshes_of
 from .runtime.options.atlas import AtlasOptions
 from .runtime.options.unwrap import SHARINGS, CheckpointOptions, Options, Output, Outputs
 from .runtime.options.words import Names
-from .runtime.progress import Clock
-from .runtime.runfile import Run
+from .runtime.process.deadline import Deadline, interrupts_ask
+from .runtime.process.heap import keep_freed_memory
+from .runtime.process.progress import Clock
 from .train.commands import train
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def unwrap(
         asked = mesh, output, options, outputs, checkpoints.every
         if asked != ((), None, Options(), Outputs(), None):
             raise InputError("resume beside other options, expected none, as the run keeps its own; leave them out")
-        from .runtime.runfile import find_run
+        from .runtime.cli.runfile import find_run
 
         return _perform(find_run(checkpoints.resume), console)
     for word in (path for path in mesh if str(path).startswith("-") and path != STREAM):
@@ -291,7 +291,7 @@ def doctor() -> int:
 
     The command ends with 0 whatever it finds. What is missing is marked ✗ and followed by its remedy.
     """
-    from .runtime.doctor import Finding, cpu, onnx_providers, packages, probe
+    from .runtime.cli.doctor import Finding, cpu, onnx_providers, packages, probe
     from .runtime.kernel.choice import describe
 
     findings = [

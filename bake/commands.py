@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from .. import __version__
-from ..runtime.console import Console, Manners
+from ..runtime.cli.console import Console, Manners
 from ..runtime.errors import InputError
 from ..runtime.extras import requires
 from ..runtime.options.atlas import AtlasOptions, Seeded
 from ..runtime.options.unwrap import AUTO, LAST_SET, Flag, MapOptions, Names, Output, Outputs, demand
 from ..runtime.options.words import Paths
-from ..runtime.progress import Clock
+from ..runtime.process.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
 from .results.output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexpara.runtime.cores import core_count
 from flexpara.runtime.io.meshfile import load_asset
+from flexpara.runtime.process.cores import core_count
 from flexpara.runtime.sessions.session import UnwrapSession
 
 if TYPE_CHECKING:

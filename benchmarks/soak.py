@@ -22,8 +22,8 @@ from pathlib import Path
 from statistics import median
 
 import flexpara
+from flexpara.runtime.cli.runfile import Run
 from flexpara.runtime.options.unwrap import Options, Outputs
-from flexpara.runtime.runfile import Run
 from flexpara.runtime.samples import make_sample
 
 WARM = 0.1

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flexpara.runtime.batch.manifest import Entry, read_entries
-from flexpara.runtime.inputs import ENDINGS
+from flexpara.runtime.cli.inputs import ENDINGS
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 DEFAULT = (SHARED / "models", SHARED / "corpus" / "organic")

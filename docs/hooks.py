@@ -18,7 +18,7 @@ SOURCES = (
     "runtime/options/seams.py",
     "runtime/options/pack.py",
     "runtime/options/batch.py",
-    "runtime/console.py",
+    "runtime/cli/console.py",
     "bake/commands.py",
 )
 PLACE = re.compile(r"^<!-- options: (\w+) -->$", re.MULTILINE)

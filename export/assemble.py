@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset, Atlas, Charts, Frame
     from ..runtime.pack.square import Square
     from ..runtime.pagesize import Size
-    from ..runtime.progress import Clock
+    from ..runtime.process.progress import Clock
     from ..train.deploy.gated import GatedExperts
     from ..train.pipeline import Trained
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..runtime.mesh import Asset
     from ..runtime.options.unwrap import Options
     from ..runtime.pack.square import Square
-    from ..runtime.progress import Clock
+    from ..runtime.process.progress import Clock
     from ..train.pipeline import Trained
 
 

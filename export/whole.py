@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..runtime.meanwhile import load_meanwhile
 from ..runtime.pack.square import square_of
+from ..runtime.process.meanwhile import load_meanwhile
 from ..train.presets import train_asset, train_cloud
 
 if TYPE_CHECKING:
     from ..runtime.io.points.cloud import CloudMesh, PointCloud
     from ..runtime.mesh import Asset
     from ..runtime.options.unwrap import Options
-    from ..runtime.progress import Clock
+    from ..runtime.process.progress import Clock
     from ..train.presets import Keep
     from .assemble import Unwrapped
 

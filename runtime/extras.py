@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from .errors import FlexparaError, MissingDependencyError
-from .forks import refuse_fork_of_torch
+from .process.forks import refuse_fork_of_torch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

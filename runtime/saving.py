@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .files import OutputFolder
     from .mesh import Asset
     from .options.unwrap import Outputs
-    from .progress import Progress
+    from .process.progress import Progress
 
 
 Wanted = TypeVar("Wanted", bound="Outputs")

@@ -21,9 +21,9 @@ from flexpara.runtime.samples import make_sample
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from flexpara.runtime.deadline import Deadline
     from flexpara.runtime.mesh import Surface
-    from flexpara.runtime.progress import Progress
+    from flexpara.runtime.process.deadline import Deadline
+    from flexpara.runtime.process.progress import Progress
 
 MODELS = Path(__file__).resolve().parent.parent.parent / "shared" / "models"
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -128,7 +128,7 @@ def test_modules_are_loaded_one_at_a_time_while_there_is_nothing_else_to_do() ->
     code = """
 import sys
 from flexpara.export.whole import load_what_follows
-from flexpara.runtime.meanwhile import load_next
+from flexpara.runtime.process.meanwhile import load_next
 assert not load_next()
 load_what_follows()
 print("scipy.optimize" in sys.modules, load_next(), "scipy.optimize" in sys.modules, "onnx" in sys.modules)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flexpara.__main__ import main
-from flexpara.runtime.inputs import ending_of
+from flexpara.runtime.cli.inputs import ending_of
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 QUICK = ["--size", "64", "--maps", "none", "--no-preview", "--quiet"]

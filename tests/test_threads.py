@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from flexpara.runtime.cores import LIMIT
+from flexpara.runtime.process.cores import LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

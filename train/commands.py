@@ -8,11 +8,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .. import __version__, load
-from ..runtime.console import Console, Manners
-from ..runtime.deadline import Deadline
+from ..runtime.cli.console import Console, Manners
 from ..runtime.extras import requires
 from ..runtime.options.unwrap import Output, TrainOptions
-from ..runtime.progress import Clock
+from ..runtime.process.deadline import Deadline
+from ..runtime.process.progress import Clock
 
 TRAINED = "trained.safetensors"
 CHARTS = Parameter(name="*", group="Charts and atlas")

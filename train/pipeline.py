@@ -15,7 +15,7 @@ from ..runtime.geometry.places import priced_places
 from ..runtime.geometry.topology import edge_table, split_non_manifold_vertices
 from ..runtime.io.asset.wantedseams import NO_WISH
 from ..runtime.mesh import Charts, Frame, Surface
-from ..runtime.progress import Stages
+from ..runtime.process.progress import Stages
 from .charts.charts import Finished, chart_surface
 from .charts.objective import priced
 from .charts.starts import Known
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from torch import nn
 
-    from ..runtime.deadline import Deadline
     from ..runtime.geometry.places import PlaceConfig
     from ..runtime.io.asset.wantedseams import WantedSeams
-    from ..runtime.progress import Progress
+    from ..runtime.process.deadline import Deadline
+    from ..runtime.process.progress import Progress
     from .config import FinishConfig, TrainConfig
     from .deploy.gated import GatedExperts
 

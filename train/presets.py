@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..runtime.io.points.cloud import CloudMesh, PointCloud
     from ..runtime.mesh import Asset
     from ..runtime.options.unwrap import TrainOptions
-    from ..runtime.progress import Clock
+    from ..runtime.process.progress import Clock
     from .pipeline import Trained
 
     Keep = tuple[Path, int]

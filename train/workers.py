@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from ..runtime.cores import core_count
 from ..runtime.errors import FinishError
-from ..runtime.meanwhile import load_next
+from ..runtime.process.cores import core_count
+from ..runtime.process.meanwhile import load_next
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

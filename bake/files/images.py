@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...runtime.cores import core_count
 from ...runtime.errors import FlexparaError, InputError, MissingDependencyError
+from ...runtime.process.cores import core_count
 from ..colors.color import srgb_bytes_from_linear, srgb_from_linear
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.cores import core_count
 from ...runtime.material import Material, used_materials
+from ...runtime.process.cores import core_count
 from .resample import FootprintSampler, SourceTexture, linear_colors, texel_axes
 from .tangents import mikk_tangents
 

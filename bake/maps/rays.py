@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ...runtime.cores import core_count
 from ...runtime.errors import InputError, MissingDependencyError
 from ...runtime.mesh import Frame
+from ...runtime.process.cores import core_count
 
 try:
     import lagrange

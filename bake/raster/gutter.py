@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ...runtime.cores import core_count
 from ...runtime.errors import InputError
+from ...runtime.process.cores import core_count
 from .background import NearestCells
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...runtime.console import Console, Manners
+from ...runtime.cli.console import Console, Manners
+from ...runtime.cli.inputs import meshes_of
 from ...runtime.errors import InputError
 from ...runtime.extras import requires
-from ...runtime.inputs import meshes_of
 from ...runtime.options.pack import PackOptions, PackOutputs
 from ...runtime.options.unwrap import Output
-from ...runtime.progress import Clock
+from ...runtime.process.progress import Clock
 from ..checks import padding_of
 
 PAGE = Parameter(name="*", group="Islands and page")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.pack import PackOutputs
-    from ...runtime.progress import Clock
+    from ...runtime.process.progress import Clock
     from .repacked import PackResult
 
 

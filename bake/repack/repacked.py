@@ -16,7 +16,7 @@ from ...runtime.options.keywords import from_keywords
 from ...runtime.options.pack import PackOptions, PackOutputs
 from ...runtime.pack.repack import repack, repack_pages
 from ...runtime.pack.square import square_of
-from ...runtime.progress import Clock
+from ...runtime.process.progress import Clock
 from ...runtime.saving import Saving
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ...runtime.files import OutputFolder
     from ...runtime.io.meshfile import MeshLike
     from ...runtime.mesh import Asset, Atlas
-    from ...runtime.progress import Progress
+    from ...runtime.process.progress import Progress
 
 TOGETHER = "packed"
 """Name of the textures and the report of several meshes on one page."""

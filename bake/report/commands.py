@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...runtime.console import Console, Manners
+from ...runtime.cli.console import Console, Manners
 from ...runtime.errors import InputError
 
 if TYPE_CHECKING:

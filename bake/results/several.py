@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.unwrap import Outputs
-    from ...runtime.progress import Clock
+    from ...runtime.process.progress import Clock
     from .output import BakeJob
 
 

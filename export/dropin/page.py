@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Deadline
 from ...runtime.errors import FinishError, InputError, MeshError
 from ...runtime.geometry.metrics import uv_charts
 from ...runtime.geometry.rows import by_first_appearance, equal_rows, first_of_each
@@ -24,7 +23,8 @@ from ...runtime.io.rawmesh import LARGEST_DIAGONAL, RawMesh
 from ...runtime.mesh import Asset, Charts, Frame, Surface
 from ...runtime.pack.config import PackConfig
 from ...runtime.pack.packing import Packed, pack
-from ...runtime.progress import Stages
+from ...runtime.process.deadline import Deadline
+from ...runtime.process.progress import Stages
 from ...train.charts.charts import Finished, chart_surface
 from ...train.charts.recut import drawn_again
 from ...train.config import FinishConfig

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..console import Console, Manners
+from ..cli.console import Console, Manners
 from ..errors import InputError
 from ..options.batch import BatchOptions
 from ..options.unwrap import Options, Outputs

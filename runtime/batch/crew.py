@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..cores import own_cores
+from ..process.cores import own_cores
 from .pool import Limits, Worker, wait_for
 
 if TYPE_CHECKING:

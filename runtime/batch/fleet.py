@@ -14,10 +14,10 @@ import socket
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ..cli.runfile import facts_of, run_of
 from ..errors import FlexparaError, InputError
 from ..extras import requires
 from ..files import sweep
-from ..runfile import facts_of, run_of
 from .crew import died_of
 from .jobs import Job
 from .pool import Limits, Worker, wait_for

@@ -10,12 +10,12 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..cli.inputs import ENDINGS
+from ..cli.runfile import Run
 from ..errors import InputError, MissingFileError
 from ..files import results_in
-from ..inputs import ENDINGS
 from ..options.keywords import from_keywords
 from ..options.unwrap import Options, Outputs
-from ..runfile import Run
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -18,10 +18,10 @@ from pathlib import Path
 from selectors import EVENT_READ, DefaultSelector
 from typing import TYPE_CHECKING, Any
 
-from ..cores import LIMIT
-from ..deadline import hold_back, let_in
+from ..cli.runfile import facts_of
 from ..files import sweep
-from ..runfile import facts_of
+from ..process.cores import LIMIT
+from ..process.deadline import hold_back, let_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -18,10 +18,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..deadline import drop_waiting, hold_back
+from ..cli.runfile import Run, run_of
 from ..errors import DiskFullError, FlexparaError
-from ..heap import give_freed_memory_back, keep_freed_memory
-from ..runfile import Run, run_of
+from ..process.deadline import drop_waiting, hold_back
+from ..process.heap import give_freed_memory_back, keep_freed_memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable

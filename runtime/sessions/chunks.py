@@ -5,8 +5,8 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-from ..cores import core_count
 from ..errors import BundleError, InputError
+from ..process.cores import core_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

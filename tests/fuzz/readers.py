@@ -105,7 +105,7 @@ def read_report(path: Path) -> object:
 
 def read_run(path: Path) -> object:
     """As `unwrap --resume` reads it."""
-    from flexpara.runtime.runfile import find_run
+    from flexpara.runtime.cli.runfile import find_run
 
     return find_run(path.parent.parent)
 

@@ -19,8 +19,8 @@ from trimesh.exchange.gltf import export_gltf
 
 import flexpara
 from flexpara.__main__ import main
+from flexpara.runtime.cli.runfile import Run
 from flexpara.runtime.options.unwrap import Options, Outputs
-from flexpara.runtime.runfile import Run
 from flexpara.train.paper.checkpoint import Checkpoints, State
 from flexpara.train.paper.config import PaperConfig, PaperNets
 

@@ -12,7 +12,7 @@ pytest.importorskip("torch")
 from flexpara.__main__ import main
 from flexpara.runtime.io.points.cloud import PointCloud
 from flexpara.runtime.options.unwrap import ABLATIONS, TrainOptions
-from flexpara.runtime.progress import Clock
+from flexpara.runtime.process.progress import Clock
 from flexpara.train import presets
 from flexpara.train.cloud.config import CloudConfig
 from flexpara.train.paper import pipeline

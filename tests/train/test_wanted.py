@@ -16,7 +16,7 @@ from flexpara.runtime.io.asset.wantedseams import torn, wanted_seams
 from flexpara.runtime.io.meshfile import asset_from_arrays
 from flexpara.runtime.options.seams import SeamOptions
 from flexpara.runtime.options.unwrap import TrainOptions
-from flexpara.runtime.progress import Clock
+from flexpara.runtime.process.progress import Clock
 from flexpara.runtime.samples import make_sample
 from flexpara.train.presets import train_asset
 

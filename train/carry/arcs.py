@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.cutgraph import edge_costs, path_mask
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.straightpaths import Roads, straightest_path
 from ...runtime.geometry.topology import boundary_loops, edge_table, face_components
+from ...runtime.process.deadline import Late, never
 from ..finish.arap import RigidSteps, evened_out
 from ..finish.contact import Relaxed, boundary_edges, converge, relax, rim_overlaps, separate
 from ..finish.flatten import jacobians

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.distortion import singular_values
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import boundary_loops, components, edge_table, within_rings
 from ...runtime.mesh import Surface
+from ...runtime.process.deadline import Late, never
 from ..finish.arap import RigidSteps, evened_out, nearest_rotations
 from ..finish.contact import boundary_edges, rim_faces
 from ..finish.fallback import unwrapped_by_xatlas

@@ -13,8 +13,8 @@ from .layout import near_faces
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...runtime.deadline import Late
     from ...runtime.mesh import Surface
+    from ...runtime.process.deadline import Late
     from ..config import FinishConfig
     from ..finish.pieces import Piece
     from ..search.labels import DualGraph

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...runtime.cores import core_count
+from ...runtime.process.cores import core_count
 from ..finish.arap import RigidSteps, nearest_rotations
 from ..finish.flatten import jacobians
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
+from ...runtime.process.deadline import Late, never
 from ..finish.contact import excess_energy
 from ..finish.flaps import attached
 from ..finish.pieces import measured

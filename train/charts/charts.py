@@ -15,7 +15,7 @@ import numpy as np
 
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
-from ...runtime.progress import Stages
+from ...runtime.process.progress import Stages
 from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
@@ -39,7 +39,7 @@ from .starts import NOTHING, Starts, best_search
 from .tighten import back_on, is_asked, settled, tightened
 
 if TYPE_CHECKING:
-    from ...runtime.deadline import Late
+    from ...runtime.process.deadline import Late
     from ..config import FinishConfig
     from ..search.search import Search
     from .starts import Known

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.metrics import uv_charts
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import edge_table, split_non_manifold_vertices
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
+from ...runtime.process.deadline import Late, never
 from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carry_piece
 from ..carry.layout import nearest_faces

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
+from ...runtime.process.deadline import Late, never
 from ..carry.carry import carried_ways, carry_piece
 from ..finish.pieces import Piece
 from ..finish.slits import Flat

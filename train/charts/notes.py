@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ...runtime.deadline import Deadline, Late
+    from ...runtime.process.deadline import Deadline, Late
     from ..config import FinishConfig
     from .charts import Solved
 

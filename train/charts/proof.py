@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ...runtime.deadline import Late, never
 from ...runtime.errors import FinishError
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.process.deadline import Late, never
 from ..finish.config import ProjectConfig
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.flaps import trimmed

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
+from ...runtime.process.deadline import Late, never
 from ..search.labels import dual_graph
 from ..search.search import Search
 from ..search.starts import clusters, pieces_by_score

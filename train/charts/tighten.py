@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...runtime.deadline import Late, never
+from ...runtime.process.deadline import Late, never
 from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carried_back
 from ..carry.network import network_carried

@@ -14,9 +14,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import KDTree
 
-from ...runtime.cores import core_count
 from ...runtime.geometry.rows import distinct
 from ...runtime.kernel.choice import kernel
+from ...runtime.process.cores import core_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.cores import core_count
 from ...runtime.geometry.normals import tangent_frames
 from ...runtime.geometry.triangles import triangle_cross
 from ...runtime.kernel.choice import kernel
+from ...runtime.process.cores import core_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

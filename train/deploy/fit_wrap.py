@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Charts, Surface
-    from ...runtime.progress import Progress
+    from ...runtime.process.progress import Progress
     from .gated import GatedExperts
 
 

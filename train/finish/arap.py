@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from ...runtime.cores import core_count
 from ...runtime.geometry.overlap import flipped_triangles
 from ...runtime.geometry.topology import within_rings
 from ...runtime.kernel.choice import kernel
+from ...runtime.process.cores import core_count
 from .curvature import factorize
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from ...runtime.cores import core_count
 from ...runtime.kernel.choice import kernel
+from ...runtime.process.cores import core_count
 from .curvature import factorize
 
 if TYPE_CHECKING:

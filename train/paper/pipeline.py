@@ -18,7 +18,7 @@ import torch
 from ...runtime.geometry.metrics import measure
 from ...runtime.geometry.triangles import corner_angles, edge_lengths, signed_areas, triangle_areas
 from ...runtime.mesh import Charts, Frame, Surface
-from ...runtime.progress import Stages
+from ...runtime.process.progress import Stages
 from ..charts.charts import chart_surface
 from ..charts.starts import Known
 from ..config import TrainConfig
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...runtime.progress import Progress
+    from ...runtime.process.progress import Progress
     from ..charts.charts import Finished
     from .checkpoint import Checkpoints
     from .config import PaperConfig

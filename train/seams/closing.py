@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.cutgraph import cut_chains
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
+from ...runtime.process.deadline import Late, never
 from ..finish.contact import Relaxed, boundary_edges, excess_energy, rim_overlaps, separate
 from ..finish.curvature import border_first, foretold_energies
 from ..finish.disks import cut_open

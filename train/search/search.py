@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.deadline import Late, never
 from ...runtime.geometry.distortion import oriented_energy
+from ...runtime.process.deadline import Late, never
 from ..finish.contact import Relaxed, converge
 from ..finish.flaps import Trimmed, restricted
 from ..finish.flatten import jacobians

@@ -19,10 +19,10 @@ import xatlas as real
 
 import flexpara.xatlas as xatlas  # pyright: ignore[reportMissingImports]  # runtime/aliases.py finds it
 from flexpara.export.dropin import page
-from flexpara.runtime.deadline import Deadline
 from flexpara.runtime.errors import FinishError, FlexparaError, ShapeError
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.io.meshfile import asset_from_arrays
+from flexpara.runtime.process.deadline import Deadline
 from flexpara.train.charts.charts import chart_surface
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from flexpara.runtime.mesh import Surface
-    from flexpara.runtime.progress import Stages
+    from flexpara.runtime.process.progress import Stages
     from flexpara.train.charts.charts import Finished
     from flexpara.train.config import FinishConfig
 

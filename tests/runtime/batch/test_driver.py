@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are wat
 NO_LIMITS = Limits()
 WORKS = """
 import json, os, signal, time
-from flexpara.runtime.deadline import Deadline, interrupts_ask
+from flexpara.runtime.process.deadline import Deadline, interrupts_ask
 from flexpara.runtime.errors import DiskFullError, InputError
 
 def write(run):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flexpara.bake.commands import BakeOptions, HighOptions
-from flexpara.runtime.console import Console
+from flexpara.runtime.cli.console import Console
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Surface

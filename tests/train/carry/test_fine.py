@@ -13,7 +13,7 @@ pytest.importorskip("igl")
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import boundary_loops, edge_table
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.progress import Stages
+from flexpara.runtime.process.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.carry import fine
 from flexpara.train.carry.fine import bounded, laid_out, refined, rotations, weights_of, without_folds, wrong_faces

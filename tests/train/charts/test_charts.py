@@ -10,13 +10,13 @@ import pytest
 
 pytest.importorskip("igl")
 
-from flexpara.runtime.deadline import Deadline
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import components, edge_table
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.progress import Stages
+from flexpara.runtime.process.deadline import Deadline
+from flexpara.runtime.process.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts import charts as module
 from flexpara.train.charts.charts import Finished, chart_surface

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("igl")
 
 from flexpara.runtime.mesh import Surface
-from flexpara.runtime.progress import Stages
+from flexpara.runtime.process.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts.charts import Finished, chart_surface
 from flexpara.train.charts.mirror import mirror_of

@@ -11,7 +11,7 @@ import torch
 
 from flexpara.runtime.geometry.metrics import measure
 from flexpara.runtime.mesh import Charts, Frame, Surface
-from flexpara.runtime.progress import Stages
+from flexpara.runtime.process.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.config import FitConfig, TrainConfig
 from flexpara.train.deploy.config import SampleConfig

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from flexpara.runtime.console import Console
+from flexpara.runtime.cli.console import Console
 
 
 def test_notes_of_a_report_are_said_one_a_line_unless_quiet(capsys: pytest.CaptureFixture[str]) -> None:

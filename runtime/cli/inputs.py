@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import InputError, MissingFileError
+from ..errors import InputError, MissingFileError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,11 +9,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..errors import InputError
+from ..options.atlas import AtlasOptions
+from ..options.unwrap import Flag, Output
+from ..pagesize import Size
 from .console import show
-from .errors import InputError
-from .options.atlas import AtlasOptions
-from .options.unwrap import Flag, Output
-from .pagesize import Size
 
 SAMPLE_FORMATS = (".ply", ".obj", ".stl", ".off", ".glb")
 
@@ -27,9 +27,9 @@ def query(bundle: Path, points: Path, *, output: Output, force: Flag = False) ->
         output: The file for points, uv, chart and score: npz or csv.
         force: Overwrite that file.
     """
-    from .files import OutputFolder, write_whole
-    from .io.points.pointfile import check_output, read_points, write_unwrapped
-    from .sessions.session import UnwrapSession
+    from ..files import OutputFolder, write_whole
+    from ..io.points.pointfile import check_output, read_points, write_unwrapped
+    from ..sessions.session import UnwrapSession
 
     check_output(output)
     OutputFolder(output.parent, output.stem, force=force).check([output.name])
@@ -57,10 +57,10 @@ def evaluate(
     """
     if size is not None:
         AtlasOptions(size=size)
-    from .files import write_whole
-    from .geometry.metrics import measure
-    from .io.formats.npz import write_faces
-    from .io.meshfile import load
+    from ..files import write_whole
+    from ..geometry.metrics import measure
+    from ..io.formats.npz import write_faces
+    from ..io.meshfile import load
 
     asset = load(mesh)
     if asset.uv is None:
@@ -86,8 +86,8 @@ def sample(name: str, *, output: Output, resolution: int | None = None, force: F
         resolution: The number of edges along the longest line.
         force: Overwrite that file.
     """
-    from .files import OutputFolder, write_whole
-    from .samples import make_sample
+    from ..files import OutputFolder, write_whole
+    from ..samples import make_sample
 
     if output.suffix.lower() not in SAMPLE_FORMATS:
         expected = ", ".join(SAMPLE_FORMATS)

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from flexpara.runtime.deadline import Deadline
-from flexpara.runtime.progress import Clock, Stages, progress_bars
+from flexpara.runtime.process.deadline import Deadline
+from flexpara.runtime.process.progress import Clock, Stages, progress_bars
 
 
 class Terminal(io.StringIO):

@@ -11,8 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .. import __version__
-from .extras import PACKAGE
+from ... import __version__
+from ..extras import PACKAGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 
-from .errors import FlexparaError
+from ..errors import FlexparaError
 
 _parents_with_torch: list[int] = []
 """Of this process: the parent that had loaded torch when it was forked, if there is one."""

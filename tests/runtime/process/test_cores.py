@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from flexpara.runtime.cores import LIMIT, core_count, own_cores
+from flexpara.runtime.process.cores import LIMIT, core_count, own_cores
 
 
 @pytest.mark.parametrize(("asked", "most"), [("1", 1), ("0", 1), ("100000", 100000), ("", 100000), ("two", 100000)])

@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from .extras import requires
+from ..extras import requires
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

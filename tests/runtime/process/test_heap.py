@@ -8,14 +8,14 @@ import sys
 
 import pytest
 
-from flexpara.runtime.heap import keep_freed_memory
+from flexpara.runtime.process.heap import keep_freed_memory
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="faults are counted by Linux")
 
 ROUNDS = """
 import json, resource, sys
 import numpy as np
-from flexpara.runtime.heap import give_freed_memory_back, keep_freed_memory
+from flexpara.runtime.process.heap import give_freed_memory_back, keep_freed_memory
 
 def resident():
     return int(open("/proc/self/statm").read().split()[1]) * 4096

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from flexpara.runtime.cli.runfile import Run, find_run
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.options.unwrap import Options, Outputs
-from flexpara.runtime.runfile import Run, find_run
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, MissingFileError
-from .files import replace_file
-from .options.unwrap import Options, Outputs
+from ..errors import InputError, MissingFileError
+from ..files import replace_file
+from ..options.unwrap import Options, Outputs
 
 FOLDER = ".checkpoint"
 NAME = "run.json"

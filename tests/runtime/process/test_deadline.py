@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from flexpara.runtime.deadline import Deadline, interrupts_ask, never
+from flexpara.runtime.process.deadline import Deadline, interrupts_ask, never
 
 
 def test_without_a_budget_it_never_passes_by_itself() -> None:

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from .errors import InputError
-from .extras import PACKAGE
-from .options.unwrap import Flag
-from .progress import progress_bars, progress_lines
+from ..errors import InputError
+from ..extras import PACKAGE
+from ..options.unwrap import Flag
+from ..process.progress import progress_bars, progress_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from .io.points.cloud import PointCloud
-    from .mesh import Asset
-    from .progress import Progress
+    from ..io.points.cloud import PointCloud
+    from ..mesh import Asset
+    from ..process.progress import Progress
 
 SUMMARY = {
     "page": "{}",
@@ -62,7 +62,7 @@ class Console:
 
         Raises: InputError that names them all, when strict.
         """
-        from .io.asset.changes import told
+        from ..io.asset.changes import told
 
         self.demand_none(source.stem, told({**source.changes, **(lost or {})}))
 

@@ -6,7 +6,7 @@ from importlib import metadata
 
 import pytest
 
-from flexpara.runtime.doctor import Finding, cpu, packages, probe
+from flexpara.runtime.cli.doctor import Finding, cpu, packages, probe
 
 
 def test_a_finding_without_a_remedy_is_ticked() -> None:
