@@ -6,7 +6,7 @@ outlines themselves.  Whatever places charts, this comes last.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +32,7 @@ class Crowd:
     half: NDArray[np.float64]
     centre: NDArray[np.float64]
     factor: float
-    extent: NDArray[np.float64] = field(default_factory=lambda: np.ones(2))
+    extent: NDArray[np.float64]
 
     def segments(self) -> NDArray[np.float64]:
         """(s, 2, 2) where the segments lie."""

@@ -19,7 +19,8 @@ SQUARE = np.stack([CORNERS, np.roll(CORNERS, -1, axis=0)], axis=1)
 def squares(*centre: tuple[float, float], side: float = 1.0) -> Crowd:
     count = len(centre)
     half = np.full((count, 2), side / 2.0)
-    return Crowd(np.concatenate([side * SQUARE] * count), np.repeat(np.arange(count), 4), half, np.array(centre), 1.0)
+    local, chart = np.concatenate([side * SQUARE] * count), np.repeat(np.arange(count), 4)
+    return Crowd(local, chart, half, np.array(centre), 1.0, np.ones(2))
 
 
 def test_one_square_fills_what_the_border_leaves() -> None:
