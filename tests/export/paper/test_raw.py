@@ -13,8 +13,8 @@ from flexpara.export.graph.metadata import Provenance
 from flexpara.export.paper.raw import MARGIN, raw_atlas, raw_charts, raw_onnx
 from flexpara.runtime.mesh import Frame, Surface
 from flexpara.runtime.sessions.session import UnwrapSession
-from flexpara.train.paper.config import PaperNets
-from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
+from flexpara.train.paper.config import PaperConfig, PaperNets
+from flexpara.train.paper.training import make_networks
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,10 +52,8 @@ def test_charts_share_one_scale_and_stay_in_their_cells() -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_the_file_answers_as_the_networks_do(count: int, tmp_path: Path) -> None:
-    generator = torch.Generator().manual_seed(4)
-    model = GlobalNetworks(NETS, generator=generator)
-    if count > 1:
-        model = MultiChartPaperNetworks(count, NETS, generator=generator)
+    config = PaperConfig("global" if count == 1 else "multi-chart", count, nets=NETS)
+    model = make_networks(config, torch.Generator().manual_seed(4))
     frame = Frame.of(SQUARE.vertices)
     path = tmp_path / "square.paper.onnx"
     path.write_bytes(raw_onnx(model, SQUARE, frame, 512, Provenance("ab")))

@@ -12,8 +12,8 @@ from flexpara.export.graph.metadata import PlacedCharts
 from flexpara.export.paper.torchfile import export_onnx
 from flexpara.runtime.mesh import Atlas, Charts, Frame
 from flexpara.runtime.sessions.session import UnwrapSession
-from flexpara.train.paper.config import PaperNets
-from flexpara.train.paper.networks import GlobalNetworks, MultiChartPaperNetworks
+from flexpara.train.paper.config import PaperConfig, PaperNets
+from flexpara.train.paper.training import make_networks
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,10 +38,8 @@ def placed(charts: int) -> tuple[Frame, Atlas, Charts]:
 
 @pytest.mark.parametrize("charts", [1, 3])
 def test_the_papers_networks_are_exported_and_answer_alike(charts: int, tmp_path: Path) -> None:
-    generator = torch.Generator().manual_seed(0)
-    networks = GlobalNetworks(NETS, generator=generator)
-    if charts > 1:
-        networks = MultiChartPaperNetworks(charts, NETS, generator=generator)
+    config = PaperConfig("global" if charts == 1 else "multi-chart", charts, nets=NETS)
+    networks = make_networks(config, torch.Generator().manual_seed(0))
     frame, atlas, shape = placed(charts)
     report = export_onnx(networks, PlacedCharts(frame, atlas, shape), tmp_path / "map.onnx")
     assert report is not None
