@@ -43,9 +43,7 @@ def read_materials(file: GltfFile) -> tuple[list[Material], dict[str, int]]:
     changes: dict[str, int] = dict.fromkeys(COUNTS, 0)
     pictures: dict[int, NDArray[np.uint8]] = {}
     entries = enumerate(file.tree.get("materials", []))
-    materials = [_material(file, entry, index, pictures, changes) for index, entry in entries]
-    changes["textures_to_8_bits"] = sum(is_deep(image_bytes(file, source)) for source in pictures)
-    return materials, changes
+    return [_material(file, entry, index, pictures, changes) for index, entry in entries], changes
 
 
 def uv_set(material: dict[str, Any]) -> int:
@@ -81,7 +79,7 @@ def _material(
 ) -> Material:
     """One material; known and changes grow."""
     infos = _texture_infos(entry)
-    pictures, unread = _pictures(file, infos, uv_set(entry), known)
+    pictures, unread = _pictures(file, infos, uv_set(entry), known, changes)
     for reason in unread.values():
         changes["textures_not_decoded" if reason else "textures_of_other_uv"] += 1
     surface = entry.get("pbrMetallicRoughness", {})
@@ -106,13 +104,17 @@ def _material(
 
 
 def _pictures(
-    file: GltfFile, infos: dict[Slot, dict[str, Any]], uv: int, known: dict[int, NDArray[np.uint8]]
+    file: GltfFile,
+    infos: dict[Slot, dict[str, Any]],
+    uv: int,
+    known: dict[int, NDArray[np.uint8]],
+    changes: dict[str, int],
 ) -> tuple[dict[Slot, Picture], dict[Slot, str]]:
     """The textures that can be read over a set of uv, and why others can't: "" where they lie on other uv."""
     pictures: dict[Slot, Picture] = {}
     unread: dict[Slot, str] = {}
     for slot, info in infos.items():
-        pixels = _pixels(file, info, known)
+        pixels = _pixels(file, info, known, changes)
         if isinstance(pixels, str):
             unread[slot] = pixels
         elif _coordinates(info) != uv:
@@ -127,8 +129,10 @@ def _unit(value: Any) -> float:
     return min(max(finite(value), 0.0), 1.0)
 
 
-def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | str:
-    """The picture of a textureInfo, decoded once, or why none can be had."""
+def _pixels(
+    file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.uint8]], changes: dict[str, int]
+) -> NDArray[np.uint8] | str:
+    """The picture of a textureInfo, decoded once, or why none can be had.  known and changes grow."""
     texture = file.tree["textures"][info["index"]]
     extensions = texture.get("extensions", {})
     holders = (texture, *(extensions[name] for name in (WEBP, BASIS) if name in extensions))
@@ -139,6 +143,7 @@ def _pixels(file: GltfFile, info: dict[str, Any], known: dict[int, NDArray[np.ui
         data = image_bytes(file, source)
         if not data.startswith(KTX2) and source != extensions.get(BASIS, {}).get("source"):
             known[source] = decode_image(data, known.values())
+            changes["textures_to_8_bits"] += is_deep(data)
         else:
             try:
                 known[source] = decode_ktx2(data, known.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import struct
 import zlib
@@ -12,6 +13,8 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.gltf.buffers import GltfFile
+from flexpara.runtime.io.gltf.materials import read_materials
 from flexpara.runtime.io.obj.materials import read_mtl
 from flexpara.runtime.io.pictures.colors import linear_to_srgb
 from flexpara.runtime.io.pictures.pictures import PNG, decode_image, is_deep, read_in_folder
@@ -54,6 +57,17 @@ def test_of_16_bits_a_channel_the_upper_8_are_kept(channels: int) -> None:
     assert not is_deep(png(decoded))
     _, changes = read_mtl(b"newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd a.png\n", lambda _: data)
     assert changes == {"missing_textures": 0, "textures_to_8_bits": 1}
+
+
+def test_a_deep_picture_of_a_gltf_file_is_counted_once_though_several_materials_name_it() -> None:
+    data = deep_png(np.zeros((2, 2, 3), np.uint16))
+    tree = {
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}] * 2,
+        "textures": [{"source": 0}],
+        "images": [{"uri": "data:image/png;base64," + base64.b64encode(data).decode()}],
+    }
+    _, changes = read_materials(GltfFile(tree, [], Path()))
+    assert changes == {"textures_not_decoded": 0, "textures_of_other_uv": 0, "textures_to_8_bits": 1}
 
 
 def test_a_picture_too_large_or_damaged_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
