@@ -167,14 +167,15 @@ def chart_surface(
     pieces = sorted(all_proven(surface, pieces, config.project, late), key=lambda piece: int(piece.ids.min()))
     stage.end()
     better = improvement(surface, parts, given, pieces, config) if given else None
-    pieces, left = finished_by(pieces, total, config.energy) if not late() else (pieces, 0)
+    hurry = late()
+    pieces, left = (pieces, 0) if hurry else finished_by(pieces, total, config.energy)
     ways = Counter(found.way for found in solved.values())
     facts = {"parts": len(parts), "copies": len(parts) - len(solved), **ways}
     told = (
         *hurried(stage.deadline, late),
         *notes(solved, charts, config),
         *mirror_facts(solved, config),
-        *kept_isometric(left, config),
+        *kept_isometric(left, config, late=hurry),
         *(() if better is None else (better.sentence(),)),
     )
     cost = objective(surface, pieces, config.slit.price)

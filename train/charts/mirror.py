@@ -112,7 +112,9 @@ def mirrored_charts(
     area = float(half.face_areas().sum())
     # the half counts its seams in its own √area, and they will be there twice
     slit = replace(config.slit, price=config.slit.price * 2.0 * float(np.sqrt(area)))
-    own = replace(config, slit=slit, symmetry=replace(config.symmetry, axis="none"))
+    # by the search's own energy, in which charts are compared; another that is asked for finishes the whole
+    energy, symmetry = replace(config.energy, kind="isometric"), replace(config.symmetry, axis="none")
+    own = replace(config, slit=slit, energy=energy, symmetry=symmetry)
     found = [
         replace(
             piece,

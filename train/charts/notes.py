@@ -56,8 +56,10 @@ def notes(solved: dict[int, Solved], charts: int, config: FinishConfig) -> tuple
     return tuple(found)
 
 
-def kept_isometric(charts: int, config: FinishConfig) -> Iterator[str]:
-    """What a user has to know of charts that the energy asked for would lay over themselves."""
+def kept_isometric(charts: int, config: FinishConfig, *, late: bool = False) -> Iterator[str]:
+    """What a user has to know of charts that the energy asked for would lay over themselves, or had no time for."""
+    if late and config.energy.kind != "isometric":
+        yield f"no time was left for energy {config.energy.kind}: all charts are isometric"
     if charts:
         yield f"{charts} charts would lie over themselves by energy {config.energy.kind}: they are isometric"
 

@@ -13,10 +13,12 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.process.progress import Stages
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts.charts import Finished, chart_surface
-from flexpara.train.charts.mirror import mirror_of
+from flexpara.train.charts.mirror import mirror_of, mirrored_charts
 from flexpara.train.charts.parts import extracted
 from flexpara.train.charts.proof import verify
 from flexpara.train.config import FinishConfig, StartConfig, SymmetryConfig
+from flexpara.train.finish.config import EnergyConfig
+from flexpara.train.finish.pieces import Piece
 
 CONFIG = FinishConfig(start=StartConfig(counts=(1.0,)))
 
@@ -84,6 +86,20 @@ def test_the_image_of_each_chart_is_a_chart_of_the_same_energy(price: float) -> 
     of = {frozenset(piece.ids.tolist()): piece for piece in found.pieces}
     for piece in found.pieces:
         assert of[frozenset(image[piece.ids].tolist())].energy == pytest.approx(piece.energy, abs=1e-9)
+
+
+def test_a_half_is_charted_by_the_search_s_energy_whatever_finishes_the_whole() -> None:
+    whole, seen = twice(), list[str]()
+    surface = extracted(whole.vertices, whole.faces, np.arange(len(whole.faces))).surface
+
+    def solve(half: Surface, most: int, config: FinishConfig) -> list[Piece]:
+        seen.append(config.energy.kind)
+        return chart_surface(half, most, config, 0, Stages()).pieces
+
+    mirror = mirror_of(surface, SymmetryConfig("x"))
+    assert mirror is not None
+    mirrored_charts(surface, mirror, 8, replace(CONFIG, energy=EnergyConfig("conformal")), solve)
+    assert seen == ["isometric"]
 
 
 def test_a_chart_across_the_plane_is_allowed_where_one_is_all_there_may_be() -> None:
