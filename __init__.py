@@ -6,7 +6,7 @@ uv are v up in [0, 1]² of the atlas; positions are in the units of the source f
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from . import export as export
     from . import runtime as runtime
     from . import train as train
+    from .bake.highpoly.highmaps import HighSource
     from .bake.repack.repacked import pack as pack
     from .export.assemble import Unwrapped
     from .export.dropin import xatlas as xatlas
@@ -248,27 +249,35 @@ class UnwrapResult(Unwrapping):
         outputs: Outputs,
         progress: Progress | None = None,
         note: Callable[[str], None] | None = None,
+        high: HighSource | None = None,
     ) -> tuple[Path, ...]:
-        """As `save`, into an open OutputFolder.  note: called with each fact of the result that a user should know."""
+        """As `save`, into an open OutputFolder.
+
+        note: called with each fact of the result that a user should know.  high: the high-poly meshes of the outputs,
+        where they are read already.
+        """
         from .bake.checks import check_outputs, chosen_maps
+        from .bake.highsource import high_source, mesh_maps
         from .bake.results.output import BakeJob, result_notes, stack_notes, with_cut, write_outputs, write_reports
         from .export.assemble import write_networks
         from .runtime.io.asset.changes import lost
         from .runtime.io.points.written import point_files, write_points
+        from .runtime.options.atlas import SourceOptions
         from .runtime.process.progress import Clock
 
-        outputs = outputs.for_asset(self.asset)
+        high = high or high_source(outputs, SourceOptions.crease_angle)
+        outputs = mesh_maps(outputs, self.asset, high)
         outputs = outputs if self.cloud is None else outputs.for_points()
-        maps = chosen_maps(outputs, seed=self.report["settings"]["seed"])
+        maps = chosen_maps(outputs, high=high, seed=self.report["settings"]["seed"])
         check_outputs(output, outputs, maps, more=() if self.cloud is None else point_files(output.stem))
-        clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
+        clock, report = Clock(progress), {**self.report, "outputs": outputs.facts()}
         report["changes"] = {**report["changes"], **lost(self.asset, outputs)}
         report |= write_networks(output, self.asset, self.found, clock, inverse=outputs.inverse)
         if self.cloud is not None:
             write_points(output, self.cloud, *self.point_uv())
         apart = report["metrics"]["overlap_fraction"] == 0.0
         job = BakeJob.of(self.found.atlas, self.asset, outputs, maps)
-        report |= write_outputs(output, job, clock, apart=apart)
+        report |= write_outputs(output, job, clock, apart=apart) | ({} if high is None else {"high": high.report()})
         if note is not None:
             for fact in (*stack_notes(report["pack"]), *result_notes(report)):
                 note(f"{self.asset.stem}: {fact}")
@@ -311,7 +320,7 @@ class UnwrapPages(Unwrapping):
         from .export.assemble import write_networks
         from .runtime.process.progress import Clock
 
-        clock, report = Clock(progress), {**self.report, "outputs": asdict(outputs)}
+        clock, report = Clock(progress), {**self.report, "outputs": outputs.facts()}
         pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
         several = Several(self.asset, self.tile, pairs, outputs, seed)
         jobs = several.jobs(output)

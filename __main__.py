@@ -22,6 +22,7 @@ from cyclopts.exceptions import CycloptsError
 from . import UnwrapResult, __version__, load, unwrap_asset, unwrap_asset_pages, unwrap_cloud
 from .bake.checks import check_outputs, chosen_maps, padding_of
 from .bake.commands import bake
+from .bake.highsource import high_source, mesh_maps
 from .bake.repack.commands import pack
 from .bake.report.commands import report
 from .runtime.batch.commands import batch
@@ -42,6 +43,7 @@ from .train.commands import train
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from .bake.highpoly.highmaps import HighSource
     from .runtime.files import OutputFolder
     from .runtime.mesh import Asset
 
@@ -160,7 +162,8 @@ def _one_of_several(run: Run, console: Console) -> int:
 def unwrap_one(run: Run) -> None:
     """One unwrap of a batch, without a word: files and their report are what there is to know."""
     options = replace(run.options, padding=_padding(run.options, run.outputs))
-    _perform(replace(run, options=options), Console(quiet=True), summary=False)
+    console = Console(quiet=True, force=run.force, strict=run.strict)
+    _perform(replace(run, options=options), console, summary=False)
 
 
 def _stream(mesh: Sequence[Path], output: Path, options: Options, outputs: Outputs, console: Console) -> int:
@@ -187,10 +190,10 @@ def _padding(options: AtlasOptions, outputs: Outputs) -> int | None:
     return padding_of(options.padding, outputs.target, options.page.side, light=outputs.uv_set is not None)
 
 
-def _check_files(run: Run, folder: OutputFolder, source: Asset) -> None:
+def _check_files(run: Run, folder: OutputFolder, source: Asset, high: HighSource | None) -> None:
     """Refuse before the work what writing would refuse after it.  Raises: as `check_outputs`, `check_pages`."""
-    outputs = run.outputs.for_asset(source)
-    check_outputs(folder, outputs, chosen_maps(outputs))
+    outputs = mesh_maps(run.outputs, source, high)
+    check_outputs(folder, outputs, chosen_maps(outputs, high=high))
     if run.options.udim:
         run.outputs.for_tiles()
     elif run.options.pages > 1:
@@ -211,14 +214,15 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     from .runtime.io.asset.changes import lost
     from .runtime.mesh import Asset
 
-    chosen_maps(run.outputs)
+    high = high_source(run.outputs, run.options.crease_angle)
+    chosen_maps(run.outputs, high=high)
     deadline = Deadline(run.options.time_budget)
     with console.progress() as progress:
         source = load_any(run.mesh, run.options.select)
         with OutputFolder(run.output, source.stem, force=console.force, source=run.mesh) as folder:
             if isinstance(source, Asset):
-                console.note_changes(source, lost(source, run.outputs.for_asset(source)))
-                _check_files(run, folder, source)
+                console.note_changes(source, lost(source, mesh_maps(run.outputs, source, high)))
+                _check_files(run, folder, source, high)
             run.save()
             clock, ending = Clock(progress, deadline), nullcontext()
             if run.options.preset == "fast":  # preset paper has checkpoints
@@ -230,7 +234,8 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
                     result = unwrap_asset(source, run.options, clock, run.keep)
                 else:
                     result = unwrap_asset_pages(source, run.options, clock)
-            written = result.write(folder, run.outputs, progress, console.note)
+            held = {"high": high} if high is not None else {}  # several atlases have none
+            written = result.write(folder, run.outputs, progress, console.note, **held)
     if not isinstance(source, Asset):
         console.note_changes(result.asset)
     run.forget()
@@ -264,23 +269,24 @@ def export(
         console: See Console.
     """
     options = replace(options, padding=_padding(options, outputs))
-    chosen_maps(outputs)
+    high = high_source(outputs, options.crease_angle)
+    chosen_maps(outputs, high=high)
     from .runtime.files import OutputFolder
     from .runtime.io.asset.changes import lost
     from .runtime.io.asset.shading import shaded
 
     asset = shaded(load(mesh, options.select), options.crease_angle)
     with OutputFolder(output, asset.stem, force=console.force, source=mesh) as folder:
-        outputs = outputs.for_asset(asset)
+        outputs = mesh_maps(outputs, asset, high)
         console.note_changes(asset, lost(asset, outputs))
-        check_outputs(folder, outputs, chosen_maps(outputs))
+        check_outputs(folder, outputs, chosen_maps(outputs, high=high))
         with requires("unwrap"):
             from .export.assemble import assemble
             from .runtime.pack.square import square_of
             from .train.saved import read_trained
         with console.progress() as progress:
             found = assemble(asset, read_trained(trained, asset), Clock(progress), square_of(options))
-            written = UnwrapResult(asset, found).write(folder, outputs, progress, console.note)
+            written = UnwrapResult(asset, found).write(folder, outputs, progress, console.note, high)
     console.show({**found.report["metrics"], **found.report["network"]}, written)
     return 0
 

@@ -16,7 +16,6 @@ from ..runtime.extras import requires
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from ..runtime.files import OutputFolder
     from ..runtime.options.unwrap import Outputs
@@ -25,20 +24,17 @@ if TYPE_CHECKING:
     from .highpoly.highmaps import HighSource
 
 
-def chosen_maps(
-    outputs: Outputs, *, high: HighSource | None = None, fields: Sequence[Path] = (), seed: int = 0
-) -> list[BakeMap]:
+def chosen_maps(outputs: Outputs, *, high: HighSource | None = None, seed: int = 0) -> list[BakeMap]:
     """The maps asked for, without "auto".
 
     Args:
-        outputs: names, normal format, rays.
+        outputs: names, fields, normal format, rays.
         high: high-poly meshes that the maps are taken from.
-        fields: ONNX files, one more map each.
         seed: of the rays.
 
     Raises: InputError for an unknown map or a field that is none; MissingDependencyError without flexpara[bake].
     """
-    if not outputs.maps and not fields:
+    if not outputs.maps and not outputs.fields:
         return []
     with requires("bake"):
         from .maps.catalogue import find_map
@@ -47,7 +43,7 @@ def chosen_maps(
     green, rays = outputs.normal_format, RaySettings(outputs.rays, seed=seed)
     find = find_map if high is None else high.find_map
     entries = [find(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
-    return [with_background(entry, outputs) for entry in (*entries, *(field_map(path) for path in fields))]
+    return [with_background(entry, outputs) for entry in (*entries, *(field_map(path) for path in outputs.fields))]
 
 
 def with_background(entry: BakeMap, outputs: Outputs) -> BakeMap:

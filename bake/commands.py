@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,12 +11,12 @@ from cyclopts import Parameter
 from .. import __version__
 from ..runtime.cli.console import Console, Manners
 from ..runtime.errors import InputError
-from ..runtime.extras import requires
 from ..runtime.options.atlas import AtlasOptions, Seeded
-from ..runtime.options.unwrap import AUTO, LAST_SET, Flag, MapOptions, Names, Output, Outputs, demand
-from ..runtime.options.words import Paths
+from ..runtime.options.sources import MapSources
+from ..runtime.options.unwrap import LAST_SET, Flag, MapOptions, Output, Outputs, demand
 from ..runtime.process.progress import Clock
 from .checks import check_outputs, chosen_maps, padding_of
+from .highsource import high_source, mesh_maps
 from .results.output import BakeJob, bake_textures, bleeding, gutter_of, texture_facts, texture_notes
 
 if TYPE_CHECKING:
@@ -26,21 +26,16 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BakeOptions(Seeded, AtlasOptions, MapOptions):
+class BakeOptions(Seeded, AtlasOptions, MapSources, MapOptions):
     """What is baked onto a mesh that has uv."""
 
-    maps: Names = (AUTO,)
-    """The maps to bake, by name.  auto stands for what the source has: colours and the textures of its materials, and
-    the normals of a high-poly mesh."""
-    fields: Annotated[Paths, Parameter(name="--field")] = ()
-    """An ONNX file from points to channels, which becomes a map; may be given several times."""
     uv_set: int | None = None
     """The uv set that is baked onto, 0 to 7; by default the one that the material's textures are read with."""
     udim: Flag = False
     """Bake uv beyond the unit square into further images, STEM_MAP.1001.png and so on."""
 
     def __post_init__(self) -> None:
-        for concern in (MapOptions, AtlasOptions, Seeded):
+        for concern in (MapOptions, MapSources, AtlasOptions, Seeded):
             concern.__post_init__(self)
         demand(bool(self.maps or self.fields), "maps is none, expected at least one; pass for instance --maps normal")
         fits = self.uv_set is None or 0 <= self.uv_set <= LAST_SET
@@ -51,24 +46,8 @@ class BakeOptions(Seeded, AtlasOptions, MapOptions):
     @property
     def outputs(self) -> Outputs:
         """The part of it that an unwrap has too."""
-        return Outputs(**{field.name: getattr(self, field.name) for field in fields(MapOptions)}, preview=False)
-
-
-@dataclass(frozen=True, kw_only=True)
-class HighOptions:
-    """The high-poly meshes that maps are taken from."""
-
-    high: Paths = ()
-    """A high-poly mesh that the maps are taken from; may be given several times."""
-    cage: str = "0.02"
-    """How far the rays reach for it: a share of the bounding box's diagonal, or a cage mesh with the low-poly's
-    faces."""
-    match_names: Flag = False
-    """Let each part of the low-poly mesh see only the high-poly parts that have its name."""
-
-    def __post_init__(self) -> None:
-        alone = not self.high and (self.cage, self.match_names) != (HighOptions.cage, HighOptions.match_names)
-        demand(not alone, "cage or match-names without high, expected a high-poly mesh; add --high, or leave them out")
+        shared = (*fields(MapOptions), *fields(MapSources))
+        return Outputs(**{field.name: getattr(self, field.name) for field in shared}, preview=False)
 
 
 def bake(
@@ -76,7 +55,6 @@ def bake(
     *,
     output: Output,
     options: Annotated[BakeOptions, Parameter(name="*")] = BakeOptions(),
-    source: Annotated[HighOptions, Parameter(name="*")] = HighOptions(),
     console: Manners = Console(),
 ) -> int:
     """Bake maps onto the uv that a mesh already has, whoever made it.
@@ -89,11 +67,10 @@ def bake(
         mesh: A mesh with uv.
         output: The folder for STEM_MAP.png or .exr, and STEM.bake.json, which lists them.
         options: See BakeOptions.
-        source: See HighOptions.
         console: See Console.
     """
     options = replace(options, padding=padding_of(options.padding, options.target, options.page.side))
-    high = _high_source(source, options.crease_angle)
+    high = high_source(options, options.crease_angle)
     chosen_maps(options.outputs, high=high)
     from ..runtime.files import OutputFolder
     from ..runtime.io.asset.shading import shaded
@@ -105,7 +82,7 @@ def bake(
     if not job.maps:
         raise InputError(f"maps is auto, which finds nothing to bake in {mesh.name}; pass for instance --maps ao")
     facts: dict[str, Any] = {"version": __version__, "source": {"sha256": asset.sha256}}
-    facts["settings"] = settings(options, source) | {"maps": [entry.name for entry in job.maps]}
+    facts["settings"] = settings(options) | {"maps": [entry.name for entry in job.maps]}
     report = f"{asset.stem}.bake.json"
     with OutputFolder(output, asset.stem, force=console.force, source=mesh, report=report) as folder:
         check_outputs(folder, job.outputs, job.maps, meshes=False)
@@ -142,9 +119,8 @@ def _layout(asset: Asset, options: BakeOptions, console: Console) -> Atlas:
 
 def _job(atlas: Atlas, asset: Asset, options: BakeOptions, high: HighSource | None) -> BakeJob:
     """The maps asked for, over the uv of the atlas."""
-    outputs = options.outputs.for_asset(asset) if high is None else high.outputs(options.outputs)
-    maps = chosen_maps(outputs, high=high, fields=options.fields, seed=options.seed)
-    return BakeJob.of(atlas, asset, outputs, maps)
+    outputs = mesh_maps(options.outputs, asset, high)
+    return BakeJob.of(atlas, asset, outputs, chosen_maps(outputs, high=high, seed=options.seed))
 
 
 def _bake_one(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str, Any]:
@@ -164,26 +140,6 @@ def _bake_squares(folder: OutputFolder, job: BakeJob, clock: Clock) -> dict[str,
     return {"tiles": list(tiles)}
 
 
-def settings(options: BakeOptions, source: HighOptions) -> dict[str, Any]:
+def settings(options: BakeOptions) -> dict[str, Any]:
     """All options as JSON; files by their names, padding as it is in force."""
-    plain = {**asdict(options), **asdict(source), "padding": options.margin}
-    return plain | {name: [path.name for path in plain[name]] for name in ("fields", "high")}
-
-
-def _high_source(options: HighOptions, crease_angle: float) -> HighSource | None:
-    """The high-poly meshes and how far rays reach for them.  Raises: InputError for a cage that is neither."""
-    if not options.high:
-        return None
-    with requires("bake"):
-        from .highpoly.cage import CageSettings
-        from .highpoly.highmaps import HighSource
-    from ..runtime.io.asset.shading import shaded
-    from ..runtime.io.meshfile import load_asset
-
-    try:
-        cage = CageSettings(float(options.cage), match_names=options.match_names)
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        cage = CageSettings(cage=load_asset(Path(options.cage)), match_names=options.match_names)
-    return HighSource([shaded(load_asset(path, instances=True), crease_angle) for path in options.high], cage)
+    return {**options.facts(), "padding": options.margin}

@@ -16,6 +16,7 @@ SOURCES = (
     "runtime/options/unwrap.py",
     "runtime/options/atlas.py",
     "runtime/options/seams.py",
+    "runtime/options/sources.py",
     "runtime/options/pack.py",
     "runtime/options/batch.py",
     "runtime/cli/console.py",

@@ -292,7 +292,7 @@ def _owned(folder: Path, stem: str) -> frozenset[str]:
     return frozenset(names)
 
 
-def results_in(folder: Path) -> frozenset[str]:
+def written_in(folder: Path) -> frozenset[str]:
     """Names of files that reports in the same folder list: what flexpara wrote there."""
     return frozenset(name for path in folder.glob("*.json") if path.is_file() for name in _listed(path))
 

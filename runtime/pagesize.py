@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Size: TypeAlias = int | str
 """Texels of a square page's side, or WIDTHxHEIGHT."""
+LARGEST = 65536
+"""Texels of an image's side: the exact decisions of the rasterizers hold up to it, supersampling included."""
 
 
 class PageSize(NamedTuple):
@@ -48,6 +50,11 @@ class PageSize(NamedTuple):
     def is_square(self) -> bool:
         """Whether both sides are alike."""
         return self.width == self.height
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether an image can be so large, and so small."""
+        return min(self) >= 1 and self.side <= LARGEST
 
     @property
     def side(self) -> int:

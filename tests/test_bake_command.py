@@ -180,3 +180,36 @@ def test_a_crease_angle_above_that_of_the_edge_bakes_a_gradient(square: Path) ->
     baked(square, "--high", str(roof(square, "ply")), *asked)
     across = read_image(square.parent / "out" / "square_normal.exr")[16, :, 0]
     assert (np.diff(across) > 0.0).all()
+
+
+def test_an_unwrap_takes_its_maps_from_a_high_poly_mesh_as_a_bake_does(square: Path) -> None:
+    out, high = square.parent / "unwrapped", square.with_name("high.obj")
+    high.write_text("v -1 -1 .01\nv 2 -1 .01\nv 2 2 .02\nv -1 2 .01\nf 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    words = ["--high", str(high), "--cage", "0.05", "--maps", "auto,height", "--size", "32", "--quiet"]
+    assert main(["unwrap", str(square), "-o", str(out), "--no-preview", *words]) == 0
+    report = json.loads((out / "square.report.json").read_text(encoding="utf-8"))
+    assert (report["outputs"]["high"], report["outputs"]["maps"]) == (["high.obj"], ["normal", "height"])
+    assert 0.0 < report["high"]["highest"] < 0.02
+    material = trimesh.load(out / "square.glb", force="mesh").visual.material  # pyright: ignore[reportAttributeAccessIssue]
+    assert material.normalTexture is not None
+    assert main(["bake", str(out / "square.glb"), "-o", str(square.parent / "out"), *words]) == 0
+    for name in ("square_normal.png", "square_height.exr"):
+        assert np.array_equal(*(read_image(square.parent / folder / name) for folder in ("unwrapped", "out")))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--high", "absent.obj"], "absent.obj"),
+        (["--cage", "0.1"], "cage or match-names without high"),
+        (["--high", "square.obj", "--pages", "2"], "several atlases with high"),
+        (["--high", "square.obj", "--udim", "--format", "obj"], "udim with high"),
+    ],
+)
+def test_an_unwrap_refuses_before_its_work_what_maps_cannot_be_taken_from(
+    words: list[str], said: str, square: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(square.parent)
+    assert main(["unwrap", "square.obj", "-o", "out", "--size", "32", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not (square.parent / "out").exists()

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from flexpara.bake.commands import BakeOptions, HighOptions
+from flexpara.bake.commands import BakeOptions
+from flexpara.runtime.options.sources import MapSources
 from flexpara.runtime.options.unwrap import Options, Outputs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,7 +33,7 @@ def test_every_option_is_in_the_tables() -> None:
     page = hooks().on_page_markdown((ROOT / "docs" / "reference" / "options.md").read_text(encoding="utf-8"))
     shown = set(re.findall(r"^\| `--([\w-]+)` \|", page, re.MULTILINE))
     names = {"formats": "format", "every": "checkpoint-every", "fields": "field"}
-    known = {field.name for kind in (Options, Outputs, BakeOptions, HighOptions) for field in fields(kind)}
+    known = {field.name for kind in (Options, Outputs, BakeOptions, MapSources) for field in fields(kind)}
     assert {names.get(name, name.replace("_", "-")) for name in known} - shown == set()
     assert "| `--charts` | `8` | The most charts that each connected part" in page
 

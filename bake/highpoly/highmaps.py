@@ -14,7 +14,6 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.material import source_maps
-from ...runtime.options.unwrap import AUTO
 from ..bakemap import BakeMap
 from ..maps.catalogue import HEIGHT, find_map
 from ..maps.normals import in_tangent_space, object_normal_map
@@ -62,9 +61,7 @@ class HighSource:
 
     def outputs(self, outputs: Outputs) -> Outputs:
         """The same with "auto" replaced by the maps that the high-poly meshes have, their normals first."""
-        auto = ("normal", *(name for high in self._highs for name in source_maps(high)))
-        maps = [name for entry in outputs.maps for name in (auto if entry == AUTO else (entry,))]
-        return replace(outputs, maps=tuple(dict.fromkeys(maps)))
+        return outputs.with_auto(("normal", *(name for high in self._highs for name in source_maps(high))))
 
     def find_map(
         self, name: str, *, normal_format: NormalFormat = "opengl", rays: RaySettings | None = None

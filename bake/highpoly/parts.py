@@ -6,11 +6,11 @@ else.  A face's name is that of its material where the mesh has several, else th
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.cli.partnames import part_name
 from ...runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset
-
-SUFFIX = re.compile(r"^(?P<name>.+?)[_ .-](?:low|high|lo|hi|lp|hp)(?:poly)?(?:[_ .-].*)?$", re.IGNORECASE)
-
-
-def part_name(name: str) -> str:
-    """What a low and a high part have in common: `Wheel_low` and `wheel_high.001` → `wheel`."""
-    match = SUFFIX.match(name)
-    return (match["name"] if match else name).lower()
 
 
 def face_parts(asset: Asset) -> tuple[tuple[str, ...], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from ...runtime.geometry.triangles import signed_areas
-from ...runtime.pagesize import PageSize
+from ...runtime.pagesize import LARGEST, PageSize
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from ...runtime.mesh import Atlas
     from ...runtime.pagesize import Size
 
-LARGEST = 65536
-"""Texels: the exact decisions of the rasterizers hold up to this side, supersampling included."""
 UV_SLACK = 1e-4
 """How far uv may leave [0, 1] (rounding of other tools) before it is an error."""
 
@@ -139,7 +137,7 @@ class Planes(NamedTuple):
 def check_size(size: Size | PageSize) -> None:
     """Raise InputError unless an image of that size can be made."""
     page = PageSize.of(size)
-    if min(page) < 1 or page.side > LARGEST:
+    if not page.is_possible:
         raise InputError(f"size {page.stored}: expected 1 to {LARGEST} texels a side; choose a size in that range")
 
 

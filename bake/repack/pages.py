@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,7 +56,7 @@ def write_on_pages(
     check_pages(output, shared, [page for page, _ in pages])
     jobs = page_jobs(shared, pages, result.report["settings"]["seed"])
     apart = result.report["metrics"]["overlap_fraction"] == 0.0
-    report = {**result.report, "outputs": asdict(shared), **write_pages(output, jobs, clock, apart=apart)}
+    report = {**result.report, "outputs": shared.facts(), **write_pages(output, jobs, clock, apart=apart)}
     for fact in page_notes(report):
         note(fact)
     return report

@@ -95,7 +95,7 @@ class PackResult(Saving[PackOutputs]):
         named = [f"{piece.asset.stem}.{kind}" for piece in pieces for kind in piece.outputs.formats]
         check_outputs(output, whole.outputs, whole.maps, meshes=False, more=named)
         apart = self.report["metrics"]["overlap_fraction"] == 0.0
-        report = {**self.report, "outputs": asdict(whole.outputs)}
+        report = {**self.report, "outputs": whole.outputs.facts()}
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
         cut = told({"polygons_cut": report["polygons_cut"]})
         for fact in (*cut, *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...runtime.errors import FlexparaError, InputError, MissingFileError
+from ...runtime.files import LARGEST_REPORT
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.io.gltf.uvsets import uv_of_set
 from ...runtime.io.meshfile import load_asset
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 ENDINGS = ("glb", "gltf", "obj", "ply", "usda")
 """Mesh files beside a report, the first that is there; a usda file can't be read back."""
-LARGEST_REPORT = 64 << 20
 REPORT = ".report.json"
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 BEFORE = "before"
 """How the uv that a mesh came with are called."""
 MOST_PICTURES = 40
-LARGEST = 1 << 16
-"""Texels of a side that a report may name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +55,7 @@ def page_in(value: object) -> PageSize | None:
         page = PageSize.of(value if isinstance(value, str) else int(number_of(value) or 0))
     except InputError:
         return None
-    return page if min(page) >= 1 and page.side <= LARGEST else None
+    return page if page.is_possible else None
 
 
 def reported(title: str, shape: Shape, report: Mapping[str, Any], folder: Path, picture_size: int) -> Result:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,7 +51,7 @@ def write_tiles(output: OutputFolder, whole: BakeJob, pieces: Sequence[BakeJob],
             facts = write_meshes(output, MeshJob(piece.atlas, piece.asset, piece.outputs, {}, files))
             prefix = f"{piece.asset.stem}." if len(pieces) > 1 else ""
             written |= {f"{prefix}{ending}": found for ending, found in facts.items()}
-    facts = {"outputs": asdict(whole.outputs), "written": written, "tiles": tiles, "textures": {"files": files}}
+    facts = {"outputs": whole.outputs.facts(), "written": written, "tiles": tiles, "textures": {"files": files}}
     return {**facts, "polygons_cut": polygons_cut(pieces)}
 
 

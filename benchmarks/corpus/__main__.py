@@ -24,14 +24,11 @@ import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import tables
-from .processes import ROOT, end_all, run
+from .processes import ROOT, ended_too, run
 from .tables import Row
-
-if TYPE_CHECKING:
-    from types import FrameType
 
 SUFFIXES = {".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf", ".dae", ".usda", ".usdz"}
 UNWRAP = ("--maps", "none", "--format", "glb,obj", "--no-preview", "--quiet")
@@ -191,12 +188,6 @@ def meshes(item: Path) -> list[tuple[Path, str]]:
     return [(path, f"{path.parent.name}/{path.name}") for path in found]
 
 
-def interrupted(number: int, _frame: FrameType | None) -> None:
-    """End at once, with everything that runs; rows that are written stay."""
-    end_all()
-    os._exit(128 + number)
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run, report, and say what is missed."""
     arguments = parse(argv)
@@ -223,6 +214,5 @@ def main(argv: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupted)
-    sys.exit(main())
+    with ended_too(signal.SIGINT):
+        sys.exit(main())

@@ -1,5 +1,7 @@
 """One command in a process group of its own: exit code, wall and CPU seconds, peak memory, the last line of stderr.
 
+It ends with the process that runs it, where that is interrupted, or ended from outside as by `timeout`.
+
 Memory is the larger of two, sampled five times a second: the greatest resident size that one process of the group has
 had, and the sum over the group, each shared page counted once.  `ru_maxrss` serves only where there is no /proc: a
 process begins with the peak of the one that started it.  MB are 2²⁰ bytes.
@@ -12,9 +14,15 @@ import signal
 import subprocess
 import tempfile
 import threading
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SAMPLE_SECONDS = 0.2
@@ -41,7 +49,7 @@ class Ended:
 
 def run(command: list[str], limit: float) -> Ended:
     """Run a command from the repository's root; after `limit` seconds it is killed with all that it started."""
-    with tempfile.TemporaryFile() as errors:
+    with tempfile.TemporaryFile() as errors, ended_too():
         start = perf_counter()
         process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
         RUNNING.add(process.pid)
@@ -73,10 +81,28 @@ def run(command: list[str], limit: float) -> Ended:
     )
 
 
-def end_all() -> None:
-    """Kill every command that is running, with all that it started."""
+@contextmanager
+def ended_too(*more: signal.Signals) -> Iterator[None]:
+    """Within this, being asked to end ends all that runs too; a thread leaves that to the main one.
+
+    more: signals beside those that raise nothing by themselves.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, interrupted) for number in (signal.SIGTERM, signal.SIGHUP, *more)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def interrupted(number: int, _frame: FrameType | None) -> None:
+    """End at once, with all that runs: each is a session of its own, which no signal to this one reaches."""
     for group in list(RUNNING):
         _kill(group)
+    os._exit(128 + number)
 
 
 def _watch(group: int, deadline: float, over: threading.Event, late: threading.Event, peak: list[float]) -> None:

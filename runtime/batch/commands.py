@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,7 +36,9 @@ def batch(
 ) -> int:
     """Unwrap all meshes of a folder, and of those in it, each in an output folder of its own.
 
-    The same command again does what is missing: what ended is known by manifest.jsonl in the output folder.
+    The same command again does what is missing: what ended is known by manifest.jsonl in the output folder. An option
+    that names a file, as --high, also takes a folder, for the file of each asset's name in it, or a pattern with {stem}
+    for that name and {folder} for the asset's folder.
 
     Args:
         assets: Folders, meshes, or .jsonl lists of {"file": NAME, "options": {…}} with the options of single files.
@@ -75,10 +78,11 @@ def work_off(
     first, count = batch.share
     mark = f"-{first}-of-{count}" if count > 1 else ""
     jobs = shard(find_jobs(assets, output, options, outputs, console.note), batch.share)
+    jobs = [replace(job, run=replace(job.run, force=console.force, strict=console.strict)) for job in jobs]
     manifest = output / f"manifest{mark}.jsonl"
     if batch.dry_run:
         left = left_to_do(jobs, read_entries(manifest), __version__, retry=batch.retry_failed)
-        sys.stdout.write("".join(f"{job.name}\n" for job in left))
+        sys.stdout.write("".join(f"{job.name}{job.problem and f': {job.problem}'}\n" for job in left))
         console.note(f"{len(left)} of {len(jobs)} assets are left to do")
         return 0
     with locked(output / f".batch{mark}.lock"):
@@ -91,7 +95,8 @@ def work_off(
             said = f"{entry.metrics.get('charts')} charts" if entry.status == "done" else f"failed: {entry.error}"
             console.note(f"{entry.asset}: {said}, {entry.seconds:.1f} s")
 
-        whole = not left or Driver(manifest, __version__, limits, told).run(left, crew_of(batch, limits, len(left)))
+        able = sum(not job.problem for job in left)
+        whole = not left or Driver(manifest, __version__, limits, told).run(left, crew_of(batch, limits, able))
         write_page(output, status_of(output))
     if not whole:
         console.note("interrupted: what was running is given back; the same command goes on")

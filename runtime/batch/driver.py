@@ -70,7 +70,11 @@ class Driver:
 
     def run(self, jobs: list[Job], crew: Crew) -> bool:
         """Work all jobs off; False where an interrupt ended it before."""
-        queue = list(reversed(jobs))
+        for job in jobs:
+            if job.problem:
+                self.content[job.name] = job.content()
+                self.note(job, {"status": "failed", "error": job.problem})
+        queue = [job for job in reversed(jobs) if not job.problem]
         with interrupts() as stop:
             try:
                 while (queue and not stop.count) or crew.running():

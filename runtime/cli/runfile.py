@@ -14,7 +14,9 @@ from typing import Any
 
 from ..errors import InputError, MissingFileError
 from ..files import replace_file
+from ..options.keywords import as_files
 from ..options.unwrap import Options, Outputs
+from ..options.words import file_fields
 
 FOLDER = ".checkpoint"
 NAME = "run.json"
@@ -24,13 +26,18 @@ LARGEST = 1 << 20
 
 @dataclass(frozen=True)
 class Run:
-    """One `flexpara unwrap`.  mesh, output: absolute paths.  every: steps between checkpoints, None keeps none."""
+    """One `flexpara unwrap`.  mesh, output: absolute paths.  every: steps between checkpoints, None keeps none.
+
+    force, strict: as `Console` has them, for a run that nobody watches.
+    """
 
     mesh: Path
     output: Path
     options: Options
     outputs: Outputs
     every: int | None = None
+    force: bool = False
+    strict: bool = False
 
     def __post_init__(self) -> None:
         """Refuse checkpoints where none are made (InputError)."""
@@ -72,22 +79,38 @@ def facts_of(run: Run) -> dict[str, Any]:
         "format": FORMAT,
         "mesh": str(run.mesh),
         "output": str(run.output),
-        "options": asdict(run.options),
-        "outputs": asdict(run.outputs),
+        "options": plain_options(run.options),
+        "outputs": plain_options(run.outputs),
         "every": run.every,
+        "force": run.force,
+        "strict": run.strict,
     }
+
+
+def plain_options(options: Options | Outputs) -> dict[str, Any]:
+    """Options as JSON holds them."""
+    plain = asdict(options)
+    for name in file_fields(type(options)):
+        found = plain[name]
+        plain[name] = [str(path) for path in found] if isinstance(found, tuple) else found and str(found)
+    return plain
 
 
 def run_of(facts: dict[str, Any]) -> Run:
     """The run of `facts_of`.  Raises: InputError, ValueError, TypeError, KeyError, AttributeError for what is none."""
     if facts["format"] != FORMAT:
         raise InputError(f"format is {str(facts['format'])[:60]!r}, expected {FORMAT!r}; start the run anew")
-    parts: list[dict[str, Any]] = [
-        {name: tuple(value) if isinstance(value, list) else value for name, value in facts[part].items()}
-        for part in ("options", "outputs")
-    ]
+    options, outputs = Options(**_fields(Options, facts["options"])), Outputs(**_fields(Outputs, facts["outputs"]))
     every = None if facts["every"] is None else int(facts["every"])
-    return Run(Path(facts["mesh"]), Path(facts["output"]), Options(**parts[0]), Outputs(**parts[1]), every)
+    manners = {name: bool(facts.get(name)) for name in ("force", "strict")}
+    return Run(Path(facts["mesh"]), Path(facts["output"]), options, outputs, every, **manners)
+
+
+def _fields(kind: type, facts: dict[str, Any]) -> dict[str, Any]:
+    """The fields of `plain_options`."""
+    files = file_fields(kind)
+    found = {name: as_files(value) if name in files else value for name, value in facts.items()}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
 
 
 def find_run(output: Path) -> Run:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from .atlas import AtlasOptions, Seeded
+from .sources import MapSources
 from .unwrap import FORMATS, MOST_PAGES, MapOptions, Outputs
-from .words import Flag, Names, demand
+from .words import Flag, Names, Paths, demand
 
 if TYPE_CHECKING:
     from ..mesh import Asset
@@ -58,11 +59,16 @@ class PackOutputs(Outputs):
     """Mesh files to write: some of glb, gltf (with a .bin beside it), obj, ply, usda and npz; by default the format of
     each mesh, and glb where that can't be written."""
     inverse: Annotated[Flag, Parameter(show=False)] = False
+    high: Annotated[Paths, Parameter(show=False)] = ()
+    cage: Annotated[str, Parameter(show=False)] = MapSources.cage
+    match_names: Annotated[Flag, Parameter(show=False)] = False
 
     def __post_init__(self) -> None:
         demand(not self.inverse, "inverse with pack, which fits no networks, expected unwrap; leave it out")
+        demand(not self.high, "high with pack, which moves textures, expected none; flexpara bake onto what it writes")
         if self.formats == (OWN,):
             MapOptions.__post_init__(self)
+            MapSources.__post_init__(self)
         else:
             Outputs.__post_init__(self)
 

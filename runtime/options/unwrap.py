@@ -17,9 +17,12 @@ from cyclopts import Parameter
 from .atlas import AtlasOptions, Seeded, SourceOptions
 from .seams import AUTO as AUTO
 from .seams import SeamOptions, fast_alone
+from .sources import MapSources
 from .words import Flag, Names, demand, demand_known
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ..mesh import Asset
 
 PRESETS = ("fast", "paper")
@@ -37,6 +40,8 @@ PAPER_RANGES = {"steps": (1, 99_999_999), "width": (1, 8192), "points": (16, 1_0
 """Least and most of preset paper's numbers."""
 MOST_PAGES = 1000
 """UDIM has no more tiles."""
+ONE_ATLAS = "expected one atlas; leave high out, and flexpara bake onto the files that are written"
+"""Where maps of a high-poly mesh go."""
 LAST_SET = 7
 """Of uv sets that programs read."""
 
@@ -156,7 +161,7 @@ class MapOptions:
 
     maps: Names = (AUTO,)
     """The maps to bake, by name (flexpara bake --help lists them).  auto stands for what the source has: colours and
-    the textures of its materials; none bakes nothing."""
+    the textures of its materials, or of the high-poly mesh, and its normals; none bakes nothing."""
     background: str | None = None
     """Colour of what lies beyond the padding of charts, as #rrggbb; by default the whole image is filled from the
     nearest chart, so that mip levels take in no background."""
@@ -222,15 +227,15 @@ class FileOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outputs(FileOptions, MapOptions):
+class Outputs(FileOptions, MapSources, MapOptions):
     """What an unwrap writes.
 
     Raises: InputError for a value outside what its field allows.
     """
 
     def __post_init__(self) -> None:
-        MapOptions.__post_init__(self)
-        FileOptions.__post_init__(self)
+        for concern in (MapOptions, MapSources, FileOptions):
+            concern.__post_init__(self)
         named = sorted({"obj", "usda"} & set(self.formats))
         found = f"layers with format {', '.join(named)}, whose materials name one file a map"
         demand(not (self.layers and named), f"{found}, expected glb or ply; leave one of the two out")
@@ -243,9 +248,14 @@ class Outputs(FileOptions, MapOptions):
         from ..material import refuse_unread, source_maps
 
         auto = source_maps(asset) if self.uv_set is None else ()
+        found = self.with_auto(auto)
+        refuse_unread(asset, found.maps)
+        return found
+
+    def with_auto(self, auto: "Iterable[str]") -> "Outputs":
+        """The same with these maps in the place of "auto", each map once, and preview decided."""
         maps = [name for entry in self.maps for name in (auto if entry == AUTO else (entry,))]
-        refuse_unread(asset, maps)
-        drawn = bool(self.maps) if self.preview is None else self.preview
+        drawn = bool(self.maps or self.fields) if self.preview is None else self.preview
         return replace(self, maps=tuple(dict.fromkeys(maps)), preview=drawn)
 
     def for_pages(self) -> None:
@@ -254,6 +264,7 @@ class Outputs(FileOptions, MapOptions):
         demand(fits, f"several atlases with format {found}, expected glb or gltf; pass --format glb")
         demand(not self.layers, "several atlases with layers, expected one of the two; leave the other out")
         demand(not self.report, "several atlases with report, expected one of the two; leave the other out")
+        demand(not self.high, f"several atlases with high, {ONE_ATLAS}")
 
     def for_tiles(self) -> None:
         """Raises: InputError for what a mesh over UDIM tiles can't be written as."""
@@ -265,6 +276,7 @@ class Outputs(FileOptions, MapOptions):
         )
         plain = not (self.layers or self.report) and self.target is None
         demand(plain, "udim with layers, a target or report, expected none of them; leave them out")
+        demand(not self.high, f"udim with high, {ONE_ATLAS}")
 
     def for_points(self) -> "Outputs":
         """The same without the triangles as ply or npz, whose names the points have; glb where that leaves none."""

@@ -5,7 +5,7 @@ Annotations are evaluated here, as in unwrap.py.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
 
 from cyclopts import Parameter
 
@@ -35,6 +35,11 @@ Paths = Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)]
 """An option that may be given several times."""
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option without a value, off unless it is given."""
+
+
+def file_fields(kind: type) -> frozenset[str]:
+    """Options of a class that name files: one each, or several."""
+    return frozenset(name for name, hint in get_type_hints(kind).items() if Path in (hint, *get_args(hint)))
 
 
 def demand_known(name: str, value: str, known: Sequence[str]) -> None:

@@ -133,11 +133,10 @@ def test_a_process_is_timed_and_ended_at_its_limit() -> None:
 def test_an_interrupted_run_leaves_no_process_behind(tmp_path: Path) -> None:
     alive = tmp_path / "alive"
     child = f"import pathlib, time; time.sleep(3); pathlib.Path({str(alive)!r}).touch()"
-    code = f"""import signal, sys
-from benchmarks.corpus import __main__ as corpus
-signal.signal(signal.SIGTERM, corpus.interrupted)
+    code = f"""import sys
+from benchmarks.corpus.processes import run
 print("ready", flush=True)
-corpus.run([sys.executable, "-S", "-c", {child!r}], 60.0)"""
+run([sys.executable, "-S", "-c", {child!r}], 60.0)"""
     with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()

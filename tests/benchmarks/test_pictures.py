@@ -12,12 +12,13 @@ pytest.importorskip("moderngl")
 
 from benchmarks.pictures.maps import MAPS, shown_maps
 from benchmarks.pictures.options import OTHERS, SHOWN, words_of
-from flexpara.bake.commands import BakeOptions, HighOptions
+from flexpara.bake.commands import BakeOptions
 from flexpara.runtime.options.pack import PackOptions
+from flexpara.runtime.options.sources import MapSources
 from flexpara.runtime.options.unwrap import MapOptions, Options, PaperOptions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-KINDS = (Options, PackOptions, MapOptions, BakeOptions, HighOptions)
+KINDS = (Options, PackOptions, MapOptions, BakeOptions, MapSources)
 ELSEWHERE = {"maps": "each map", "normal_format": "map-normal-format", "denoise": "map-denoise", "rays": "map-rays"}
 ELSEWHERE |= {"background": "map-background", "samples": "map-samples-16", "size": "map-size-64"}
 ELSEWHERE |= {"keep_islands": "keep-seams", "cage": "high", "importance_density": "importance"}

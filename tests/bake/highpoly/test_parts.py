@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexpara.bake.highpoly.parts import face_parts, matching_faces, part_name
+from flexpara.bake.highpoly.parts import face_parts, matching_faces
+from flexpara.runtime.cli.partnames import part_name
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.material import Material
 from flexpara.runtime.mesh import Asset, Surface

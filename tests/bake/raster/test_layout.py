@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexpara.bake.raster.layout import LARGEST, Layout, Planes, Window, check_size, windows
+from flexpara.bake.raster.layout import Layout, Planes, Window, check_size, windows
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.mesh import Asset, Atlas
+from flexpara.runtime.pagesize import LARGEST
 
 Pair = tuple[Atlas, Asset]
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexpara.bake.commands import BakeOptions, HighOptions
+from flexpara.bake.commands import BakeOptions
 from flexpara.runtime.cli.console import Console
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.material import Material, Picture
 from flexpara.runtime.mesh import Asset, Surface
 from flexpara.runtime.options.keywords import from_keywords
+from flexpara.runtime.options.sources import MapSources
 from flexpara.runtime.options.unwrap import CheckpointOptions, Options, Outputs, TrainOptions
 
 SURFACE = Surface(np.eye(3), np.array([[0, 1, 2]]))
@@ -119,7 +120,7 @@ def helps(kind: type) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize("kind", [Options, Outputs, TrainOptions, CheckpointOptions, BakeOptions, HighOptions, Console])
+@pytest.mark.parametrize("kind", [Options, Outputs, TrainOptions, CheckpointOptions, BakeOptions, MapSources, Console])
 def test_every_option_is_explained_in_a_sentence(kind: Any) -> None:
     texts = helps(kind)
     assert {field.name for field in fields(kind)} <= set(texts)
