@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..runtime.files import OutputFolder
-    from ..runtime.options.unwrap import Outputs
+    from ..runtime.options.unwrap import Options, Outputs
     from .bakemap import BakeMap
     from .files.exr import ExrSettings
     from .highpoly.highmaps import HighSource
@@ -44,6 +44,20 @@ def chosen_maps(outputs: Outputs, *, high: HighSource | None = None, seed: int =
     find = find_map if high is None else high.find_map
     entries = [find(name, normal_format=green, rays=rays) for name in outputs.maps if name != "auto"]
     return [with_background(entry, outputs) for entry in (*entries, *(field_map(path) for path in outputs.fields))]
+
+
+def ready_for(options: Options, outputs: Outputs) -> None:
+    """Refuse before a batch what would be refused for each of its assets.
+
+    Raises: InputError for maps, targets and options that are none, or exclude each other; MissingDependencyError.
+    """
+    padding_of(options.padding, outputs.target, options.page.side)
+    maps = tuple(name for name in outputs.maps if not (outputs.high and name == "height"))
+    chosen_maps(replace(outputs, maps=maps, fields=()))
+    if options.udim:
+        outputs.for_tiles()
+    elif options.several:
+        outputs.for_pages()
 
 
 def with_background(entry: BakeMap, outputs: Outputs) -> BakeMap:

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..cli.console import Console, Manners
+from ..cli.console import Console, Manners, complain
 from ..errors import InputError
 from ..options.batch import BatchOptions
 from ..options.unwrap import Options, Outputs
+from ..process.named import named
+from ..process.progress import progress_lines
 
 if TYPE_CHECKING:
     from .driver import Crew
+    from .jobs import Job
     from .manifest import Entry
     from .pool import Limits
 
 WORK = "flexpara.__main__:unwrap_one"
 """What a worker does with a job; named, not imported, as all that unwraps lies above this folder."""
+CHECK = "flexpara.bake.checks:ready_for"
+"""What refuses options that no asset could be unwrapped with."""
 INTERRUPTED = 130
 
 
@@ -67,42 +72,65 @@ def work_off(
 ) -> int:
     """Do what is left to do; the exit code: 0 where all is done, 2 where something failed, 130 where interrupted."""
     from ... import __version__
-    from ..files import replace_file
-    from .driver import Driver
     from .jobs import find_jobs, shard
     from .lock import locked
-    from .manifest import left_to_do, read_entries
-    from .pool import Limits
-    from .status import PLAN, status_of, write_page
+    from .manifest import all_entries, left_to_do
+    from .status import PAGE, status_of, write_page, write_plan
 
-    first, count = batch.share
-    mark = f"-{first}-of-{count}" if count > 1 else ""
+    named(CHECK)(options, outputs)
     jobs = shard(find_jobs(assets, output, options, outputs, console.note), batch.share)
     jobs = [replace(job, run=replace(job.run, force=console.force, strict=console.strict)) for job in jobs]
+    mark = batch.mark
     manifest = output / f"manifest{mark}.jsonl"
+
+    def left() -> list[Job]:
+        entries = all_entries(output, manifest)
+        found = left_to_do(jobs, entries, __version__, retry=batch.retry_failed)
+        console.note(f"{len(found)} of {len(jobs)} assets are left to do")
+        again = {job.name for job in found}
+        given_up = sum(entries[job.name].status == "failed" for job in jobs if job.name not in again)
+        if given_up:
+            console.note(f"{given_up} failed before and have not changed; add --retry-failed to try them again")
+        return found
+
     if batch.dry_run:
-        left = left_to_do(jobs, read_entries(manifest), __version__, retry=batch.retry_failed)
-        sys.stdout.write("".join(f"{job.name}{job.problem and f': {job.problem}'}\n" for job in left))
-        console.note(f"{len(left)} of {len(jobs)} assets are left to do")
+        sys.stdout.write("".join(f"{job.name}{job.problem and f': {job.problem}'}\n" for job in left()))
         return 0
     with locked(output / f".batch{mark}.lock"):
-        left = left_to_do(jobs, read_entries(manifest), __version__, retry=batch.retry_failed)
-        console.note(f"{len(left)} of {len(jobs)} assets are left to do")
-        replace_file(output / f"{mark.lstrip('-')}{PLAN}", json.dumps({"assets": len(jobs)}).encode())
-        limits = Limits(batch.per_asset_seconds, batch.bytes or None)
-
-        def told(entry: Entry) -> None:
-            said = f"{entry.metrics.get('charts')} charts" if entry.status == "done" else f"failed: {entry.error}"
-            console.note(f"{entry.asset}: {said}, {entry.seconds:.1f} s")
-
-        able = sum(not job.problem for job in left)
-        whole = not left or Driver(manifest, __version__, limits, told).run(left, crew_of(batch, limits, able))
+        write_plan(output, mark, jobs)
+        whole = done_by_crew(left(), manifest, batch, console)
         write_page(output, status_of(output))
     if not whole:
         console.note("interrupted: what was running is given back; the same command goes on")
         return INTERRUPTED
-    last = read_entries(manifest)
-    return 2 if any(last[job.name].status == "failed" for job in jobs if job.name in last) else 0
+    last = all_entries(output, manifest)
+    failed = sum(last[job.name].status == "failed" for job in jobs if job.name in last)
+    console.show({}, [output / PAGE])
+    console.note(f"{len(jobs) - failed} of {len(jobs)} assets are done, {failed} failed")
+    return 2 if failed else 0
+
+
+def done_by_crew(jobs: list[Job], manifest: Path, batch: BatchOptions, console: Console) -> bool:
+    """Whether all was worked off; each asset is said as it ends, what failed even when quiet."""
+    from ... import __version__
+    from .driver import Driver
+    from .pool import Limits
+
+    limits, number = Limits(batch.per_asset_seconds, batch.bytes or None), count(1)
+
+    def told(entry: Entry) -> None:
+        place = next(number)
+        if console.progress_lines:
+            progress_lines("batch", place, len(jobs))
+        if entry.status == "failed":
+            complain(f"{entry.asset}: {entry.error}", 2)
+        else:
+            console.note(
+                f"{place}/{len(jobs)} {entry.asset}: {entry.metrics.get('charts')} charts, {entry.seconds:.1f} s"
+            )
+
+    able = sum(not job.problem for job in jobs)
+    return not jobs or Driver(manifest, __version__, limits, told).run(jobs, crew_of(batch, limits, able))
 
 
 def crew_of(batch: BatchOptions, limits: Limits, jobs: int) -> Crew:

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     Facts = dict[str, Any]
 
 
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
 class Crew(Protocol):
     """Those who do the work."""
 
@@ -106,15 +109,16 @@ class Driver:
 
 @contextmanager
 def interrupts() -> Iterator[Interrupts]:
-    """Within this, interrupts are counted."""
+    """Within this, interrupts are counted, and other ways to be asked to end, by a system or a closed terminal."""
     stop = Interrupts()
 
     def handle(_number: int, _frame: FrameType | None) -> None:
         stop.since = stop.since or time.monotonic()
         stop.count += 1
 
-    before = signal.signal(signal.SIGINT, handle)
+    before = {number: signal.signal(number, handle) for number in ENDING}
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,29 +1,24 @@
-"""The assets of a batch: found in folders or listed, each with its options and an output folder of its own."""
+"""The jobs of a batch: each asset with its options, the files that those name, and an output folder of its own."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ..cli.inputs import ENDINGS
 from ..cli.runfile import Run
 from ..errors import InputError, MissingFileError
-from ..files import written_in
-from ..options.keywords import from_keywords
 from ..options.unwrap import Options, Outputs
-from .beside import Beside, folders_of, rebased
+from .assets import assets_of
+from .beside import Beside, folders_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Sequence
 
-LISTS = (".jsonl",)
-LARGEST_LINE = 1 << 16
-"""Bytes of a line of a list."""
+    from .assets import Noted
 
 
 @dataclass(frozen=True)
@@ -67,11 +62,8 @@ def _named(path: Path) -> str:
     return path.name
 
 
-Noted = Callable[[str], object]
-
-
 def find_jobs(
-    assets: Iterable[Path], output: Path, options: Options, outputs: Outputs, note: Noted = lambda _line: None
+    assets: Sequence[Path], output: Path, options: Options, outputs: Outputs, note: Noted = lambda _line: None
 ) -> list[Job]:
     """The assets of folders (and those in them), lists and single files, in the order of their names.
 
@@ -88,20 +80,14 @@ def find_jobs(
 
     Raises: MissingFileError for what is not there or holds no mesh; InputError for a damaged list.
     """
-    found: dict[Path, tuple[str, Options, Outputs]] = {}
     searched = [path.absolute() for path in assets if path.is_dir()]
-    for path in assets:
-        if path.suffix in LISTS:
-            found |= _listed(path, options, outputs)
-        else:
-            found |= {mesh: (name, options, outputs) for mesh, name in _found(path, output.absolute(), note).items()}
     named = [
         folder for folder in folders_of((options, outputs)) if not any(_holds(folder, place) for place in searched)
     ]
     beside, jobs = Beside(), list[Job]()
-    for path, (name, own_options, own_outputs) in found.items():
-        run = Run(path, output.absolute(), own_options, own_outputs)
-        jobs.append(_with_files(Job(printable(name), run), beside, name))
+    for asset in assets_of(assets, output, options, outputs, note):
+        run = Run(asset.mesh, output.absolute(), asset.options, asset.outputs)
+        jobs.append(_with_files(Job(printable(asset.name), run), beside, asset.name))
     jobs = _without_taken(jobs, searched, named, note)
     stems = Counter(_stem(job) for job in jobs)
     placed = [_placed(job, several=stems[_stem(job)] > 1) for job in jobs]
@@ -149,63 +135,6 @@ def _holds(folder: Path, path: Path) -> bool:
 def printable(name: str) -> str:
     """A name as a terminal, a page and the manifest can show it: what controls those, or is no text, is spelled out."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in name)
-
-
-def _found(path: Path, output: Path, note: Noted) -> dict[Path, str]:
-    """The meshes of a folder, or a single one, each with its name below the batch."""
-    if not path.exists():
-        raise MissingFileError(f"{path} is not there, expected a folder, a mesh or a .jsonl list; correct the path")
-    if path.is_file():
-        return {path.absolute(): path.name}
-    files = [file for file in path.rglob("*") if file.suffix.lower() in ENDINGS and file.is_file()]
-    files = sorted(file for file in files if output not in file.absolute().parents)
-    results = {folder: written_in(folder) for folder in {file.parent for file in files}}
-    sources = [file for file in files if file.name not in results[file.parent]]
-    if len(sources) < len(files):
-        count = len(files) - len(sources)
-        note(f"{path}: {count} meshes are results of flexpara by the reports beside them, and passed over")
-    if not sources:
-        found = "no mesh but results of flexpara" if files else "no mesh"
-        raise MissingFileError(f"{path} holds {found}, expected files such as {', '.join(ENDINGS)}; name a folder")
-    return {file.absolute(): file.relative_to(path).as_posix() for file in sources}
-
-
-def _listed(path: Path, options: Options, outputs: Outputs) -> dict[Path, tuple[str, Options, Outputs]]:
-    if not path.is_file():
-        raise MissingFileError(f"{path} is not there, expected a list of assets; correct the path")
-    found = {}
-    with path.open("rb") as file:
-        for number, line in enumerate(iter(lambda: file.readline(LARGEST_LINE), b""), 1):
-            if line.strip():
-                name, own = _entry(line, f"{path}, line {number}")
-                mesh = (path.parent / name).absolute()
-                below = Path(name).is_absolute() or ".." in Path(name).parts
-                chosen = _with(own, options, outputs, path.parent)
-                found[mesh] = (mesh.name if below else Path(name).as_posix(), *chosen)
-    return found
-
-
-def _entry(line: bytes, place: str) -> tuple[str, dict[str, Any]]:
-    expected = 'expected {"file": NAME, "options": {…}}; correct the line'
-    try:
-        entry = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{place} is no JSON ({error}), {expected}") from error
-    if not isinstance(entry, dict) or not isinstance(entry.get("file"), str) or not entry["file"]:
-        raise InputError(f"{place} names no file, {expected}")
-    own = entry.get("options", {})
-    if not isinstance(own, dict):
-        raise InputError(f"{place} has options that are no object, {expected}")
-    return entry["file"], own
-
-
-def _with(own: dict[str, Any], options: Options, outputs: Outputs, folder: Path) -> tuple[Options, Outputs]:
-    """The options of a line; files in them count from the folder of the list."""
-    of_outputs = {field.name for field in fields(Outputs)}
-    files = {name: value for name, value in own.items() if name in of_outputs}
-    rest = {name: value for name, value in own.items() if name not in of_outputs}
-    options, outputs = from_keywords(Options, options, rest), from_keywords(Outputs, outputs, files)
-    return rebased(options, rest, folder), rebased(outputs, files, folder)
 
 
 def shard(jobs: list[Job], share: tuple[int, int]) -> list[Job]:

@@ -84,6 +84,15 @@ def read_entries(path: Path) -> dict[str, Entry]:
     return found
 
 
+def all_entries(output: Path, own: Path | None = None) -> dict[str, Entry]:
+    """The entries of all manifests of a batch's folder, as shards leave them; where they differ, those of ``own`` hold.
+
+    Raises: InputError as `read_entries`.
+    """
+    paths = sorted(output.glob("manifest*.jsonl"), key=lambda path: (path == own, path.name))
+    return {name: entry for path in paths for name, entry in read_entries(path).items()}
+
+
 def entry_of(facts: dict[str, Any]) -> Entry:
     """The entry of a line: it may come from anyone.  Raises: ValueError, TypeError where flexpara did not write it."""
     entry = Entry(**facts)

@@ -10,11 +10,13 @@ from urllib.parse import quote
 
 from ..errors import InputError, MissingFileError
 from ..files import replace_file
-from .manifest import Entry, read_entries
+from .manifest import Entry, all_entries
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from .jobs import Job
 
 PLAN = "batch.json"
 PAGE = "index.html"
@@ -66,22 +68,35 @@ class Status:
         return [*found, *(["failed:"] if failed else []), *(f"  {entry.asset}: {entry.error}" for entry in failed)]
 
 
+def write_plan(output: Path, mark: str, jobs: Sequence[Job]) -> None:
+    """Write down which assets a batch, or a share of it, has."""
+    plan = {"assets": len(jobs), "names": [job.name for job in jobs]}
+    replace_file(output / f"{mark.lstrip('-')}{PLAN}", json.dumps(plan, ensure_ascii=False).encode())
+
+
 def status_of(output: Path) -> Status:
-    """The status of a batch's folder, all shards together.  Raises: MissingFileError where there is none."""
+    """The status of a batch's folder, all shards together: of what is an asset by now.
+
+    Raises: MissingFileError where there is none.
+    """
     plans = sorted(output.glob(f"*{PLAN}"))
     if not plans:
         raise MissingFileError(f"{output} holds no {PLAN}, expected the -o of flexpara batch; correct the path")
-    entries: dict[str, Entry] = {}
-    for path in sorted(output.glob("manifest*.jsonl")):
-        entries |= read_entries(path)
-    return Status(sum(_total(path) for path in plans), [entries[name] for name in sorted(entries)])
+    read, entries = [_plan(path) for path in plans], all_entries(output)
+    if any(names is None for _, names in read):  # written by 0.1.0 as it began
+        return Status(sum(total for total, _ in read), [entries[name] for name in sorted(entries)])
+    known = {name for _, names in read for name in names or ()}
+    return Status(len(known), [entries[name] for name in sorted(known & set(entries))])
 
 
-def _total(plan: Path) -> int:
+def _plan(path: Path) -> tuple[int, list[str] | None]:
+    """How many assets, and which; None where the plan does not say."""
     try:
-        return int(json.loads(plan.read_bytes())["assets"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{plan} is damaged ({error}), expected what flexpara wrote; run the batch again") from error
+        plan = json.loads(path.read_bytes())
+        names = plan.get("names")
+        return int(plan["assets"]), None if names is None else [str(name) for name in names]
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path} is damaged ({error}), expected what flexpara wrote; run the batch again") from error
 
 
 def write_page(output: Path, status: Status) -> Path:

@@ -14,7 +14,6 @@ import sys
 import threading
 import time
 import traceback
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from ..cli.runfile import Run, run_of
 from ..errors import DiskFullError, FlexparaError
 from ..process.deadline import drop_waiting, hold_back
 from ..process.heap import give_freed_memory_back, keep_freed_memory
+from ..process.named import named
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,8 +49,7 @@ def main(parent: str, work: str, cores: str) -> None:
     os.dup2(nothing, 1)
     os.dup2(nothing, 2)
     threading.Thread(target=_end_with, args=(int(parent),), daemon=True).start()
-    module, _, name = work.partition(":")
-    function: Callable[[Run], object] = getattr(import_module(module), name)
+    function: Callable[[Run], object] = named(work)
     for line in sys.stdin:
         drop_waiting()  # it was meant for the job before
         answers.write(json.dumps(answer(function, run_of(json.loads(line))), allow_nan=False) + "\n")

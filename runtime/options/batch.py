@@ -57,6 +57,12 @@ class BatchOptions:
         return (int(found[1]), int(found[2])) if found else (0, 0)
 
     @property
+    def mark(self) -> str:
+        """What the files of a share have in their names: "-3-of-16"; nothing where there is one share."""
+        first, count = self.share
+        return f"-{first}-of-{count}" if count > 1 else ""
+
+    @property
     def bytes(self) -> int:
         """The memory of an asset; 0 where there is no limit, or no size is given."""
         found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(KB|MB|GB|)", (self.per_asset_memory or "0").upper())

@@ -4,8 +4,9 @@ Annotations are evaluated here, as in unwrap.py.
 """
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from cyclopts import Parameter
 
@@ -37,9 +38,13 @@ Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option without a value, off unless it is given."""
 
 
-def file_fields(kind: type) -> frozenset[str]:
-    """Options of a class that name files: one each, or several."""
-    return frozenset(name for name, hint in get_type_hints(kind).items() if Path in (hint, *get_args(hint)))
+def file_fields(kind: Any) -> frozenset[str]:
+    """Options of a class that name files: one each, or several; by annotations that were evaluated, as here."""
+
+    def holds(hint: object) -> bool:
+        return hint is Path or any(holds(each) for each in get_args(hint))
+
+    return frozenset(field.name for field in fields(kind) if holds(field.type))
 
 
 def demand_known(name: str, value: str, known: Sequence[str]) -> None:

@@ -25,6 +25,7 @@ from ..limits import limits, raised
 from ..pictures.colors import as_rgba
 from ..pictures.pictures import picture_pixels, read_in_folder
 from ..rawmesh import RawMesh, merge, transformed, unit_vectors
+from .converted import CONVERTED
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,14 +34,6 @@ if TYPE_CHECKING:
 
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
 REMEDY = "pip install 'flexpara[formats]', or convert the file"
-CONVERTED = {
-    "fbx": "FBX, a format without a public description, is not read; import it in Blender and export glTF (.glb)",
-    "blend": "Blender's own files are not read; export glTF (.glb) there, or use flexpara's add-on",
-    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD is written, not read; import it in Blender and export .glb"),
-    **dict.fromkeys(("iges", "igs"), "CAD surfaces hold no triangles; tessellate them to .glb, .obj or .stl"),
-    **dict.fromkeys(("max", "ma", "mb", "c4d", "skp", "3ds"), "is a format of one program; export .glb or .obj there"),
-}
-"""Formats that people bring and that are not read, with the way out."""
 MADE_UP_GREY = [102, 102, 102, 255]
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # its log would end on stderr
 ARCHIVES = frozenset({"3mf", "3dxml", "zae"})

@@ -152,8 +152,13 @@ def test_what_comes_near_a_limit_is_asked_for_what_it_has(
     assert list(found[f"{name}.obj"].files) == [f"{name}.report.json"]
 
 
-@pytest.mark.parametrize(("interrupts", "grace"), [(1, 0.5), (2, 1e9)])
-def test_interrupts_give_back_what_is_running(interrupts: int, grace: float, tmp_path: Path, works: str) -> None:
+@pytest.mark.parametrize(
+    ("interrupts", "grace", "number"),
+    [(1, 0.5, signal.SIGINT), (2, 1e9, signal.SIGINT), (1, 0.5, signal.SIGTERM)],
+)
+def test_interrupts_give_back_what_is_running(
+    interrupts: int, grace: float, number: signal.Signals, tmp_path: Path, works: str
+) -> None:
     """The first once its grace is over, the second though it is not: who waits for "slow" has it done."""
     limits, jobs = Limits(grace=grace), jobs_in(tmp_path, "a", "slow")
     (tmp_path / "out").mkdir()
@@ -163,16 +168,16 @@ def test_interrupts_give_back_what_is_running(interrupts: int, grace: float, tmp
         while not read_entries(manifest):
             time.sleep(0.05)
         for _ in range(interrupts):
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
             time.sleep(0.3)
 
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(number)
     threading.Thread(target=interrupt, daemon=True).start()
     crew = LocalCrew(works, [[0], [0]], limits)
     whole = Driver(manifest, "1", limits, lambda _entry: None).run(jobs, crew)
     assert not whole
     assert list(read_entries(manifest)) == ["a.obj"]
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.getsignal(number) is before
 
 
 def test_workers_end_with_their_driver(works: str) -> None:

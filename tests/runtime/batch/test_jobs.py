@@ -105,6 +105,47 @@ def test_results_that_a_report_beside_them_lists_are_no_assets_and_that_is_said(
     assert "2 meshes are results of flexpara" in said[0]
 
 
+def test_hidden_files_are_no_assets_and_formats_that_are_not_read_are_named_with_the_way_out(tmp_path: Path) -> None:
+    for name in ("a.obj", "._a.obj", ".git/b.obj", "scene.fbx", "x/scene.fbx", "m.blend"):
+        mesh(tmp_path / name)
+    said: list[str] = []
+    found = find_jobs([tmp_path], tmp_path / "out", Options(), Outputs(), said.append)
+    assert [job.name for job in found] == ["a.obj"]
+    assert sorted(said)[0].startswith(f"{tmp_path}: 1 files .blend are passed over; Blender's own files are not read")
+    assert sorted(said)[1].startswith(f"{tmp_path}: 2 files .fbx are passed over; FBX, a format without")
+
+
+def test_a_folder_that_holds_itself_is_searched_once(tmp_path: Path) -> None:
+    mesh(tmp_path / "deep/a.obj")
+    (tmp_path / "deep" / "up").symlink_to(tmp_path)
+    (tmp_path / "self.obj").symlink_to(tmp_path / "self.obj")
+    assert [job.name for job in jobs_of(tmp_path)] == ["deep/a.obj"]
+
+
+def test_assets_of_one_name_from_two_places_get_two_folders(tmp_path: Path) -> None:
+    for name in ("x/a.obj", "y/a.obj", "y/b.obj"):
+        mesh(tmp_path / name)
+    listed = tmp_path / "assets.jsonl"
+    listed.write_text('{"file": "/q/a.obj"}', encoding="utf-8")
+    found = {job.name: job.run.output for job in jobs_of(tmp_path / "x", tmp_path / "y", listed)}
+    assert set(found) == {"b.obj", "q/a.obj", "x/a.obj", "y/a.obj"}
+    assert len(set(found.values())) == 4
+
+
+def test_the_output_may_be_the_folder_itself_or_lie_in_it_by_another_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a.obj", "out/a/a.obj"):
+        mesh(tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    for place, output, names in (
+        (Path(), Path(), ["a.obj", "out/a/a.obj"]),
+        (Path(), Path("../") / tmp_path.name / "out", ["a.obj"]),
+        (tmp_path, Path("out"), ["a.obj"]),
+    ):
+        assert [job.name for job in find_jobs([place], output, Options(), Outputs())] == names
+
+
 def test_a_result_that_is_named_or_listed_is_an_asset(tmp_path: Path) -> None:
     result = mesh(tmp_path / "a.glb")
     reported(tmp_path, "a.report.json", "a.glb")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from flexpara.__main__ import main
-from flexpara.runtime.batch.manifest import Entry, append, read_entries
+from flexpara.runtime.batch.manifest import Entry, all_entries, append, read_entries
 from flexpara.runtime.batch.status import Status, status_of, write_page
 from flexpara.runtime.errors import MissingFileError
 
@@ -47,6 +47,25 @@ def test_the_page_names_all_and_trusts_no_name(tmp_path: Path) -> None:
     assert "&lt;script&gt;.obj" in page
     assert "<b>" not in page
     assert "http" not in page
+
+
+def test_what_is_no_asset_any_more_does_not_count(tmp_path: Path) -> None:
+    (tmp_path / "batch.json").write_text('{"assets": 2, "names": ["a.obj", "b.obj"]}', encoding="utf-8")
+    for name in ("a.obj", "gone.obj"):
+        append(tmp_path / "manifest.jsonl", replace(ENTRY, asset=name))
+    status = status_of(tmp_path)
+    assert status.lines()[:4] == ["assets    2", "done      1", "failed    0", "left      1"]
+
+
+def test_what_shards_have_done_is_done_for_all_and_counts_once(tmp_path: Path) -> None:
+    for part, names in (("", ["a.obj", "b.obj"]), ("1-of-2", ["a.obj"])):
+        plan = {"assets": len(names), "names": names}
+        (tmp_path / f"{part}batch.json").write_text(json.dumps(plan), encoding="utf-8")
+    append(tmp_path / "manifest-1-of-2.jsonl", ENTRY)
+    append(tmp_path / "manifest.jsonl", replace(ENTRY, asset="b.obj", status="failed"))
+    assert status_of(tmp_path).lines()[:4] == ["assets    2", "done      1", "failed    1", "left      0"]
+    append(tmp_path / "manifest.jsonl", replace(ENTRY, content="own"))
+    assert all_entries(tmp_path, tmp_path / "manifest.jsonl")["a.obj"].content == "own"
 
 
 def test_shards_are_counted_together(tmp_path: Path) -> None:
