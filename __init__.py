@@ -251,11 +251,7 @@ class UnwrapResult(Unwrapping):
         note: Callable[[str], None] | None = None,
         high: HighSource | None = None,
     ) -> tuple[Path, ...]:
-        """As `save`, into an open OutputFolder.
-
-        note: called with each fact of the result that a user should know.  high: the high-poly meshes of the outputs,
-        where they are read already.
-        """
+        """As `save`, into an open OutputFolder.  note: told what a user should know.  high: of the outputs, if read."""
         from .bake.checks import check_outputs, chosen_maps
         from .bake.highsource import high_source, mesh_maps
         from .bake.results.output import BakeJob, result_notes, stack_notes, with_cut, write_outputs, write_reports

@@ -194,7 +194,8 @@ def test_an_unwrap_takes_its_maps_from_a_high_poly_mesh_as_a_bake_does(square: P
     assert material.normalTexture is not None
     assert main(["bake", str(out / "square.glb"), "-o", str(square.parent / "out"), *words]) == 0
     for name in ("square_normal.png", "square_height.exr"):
-        assert np.array_equal(*(read_image(square.parent / folder / name) for folder in ("unwrapped", "out")))
+        ours, theirs = (read_image(square.parent / folder / name) for folder in ("unwrapped", "out"))
+        assert np.array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,8 @@ def with_files(options: Chosen, files: dict[str, tuple[Path, ...]]) -> Chosen:
         if len(found) > 1 and not several:
             names = ", ".join(str(path) for path in found)
             raise InputError(f"{len(found)} files for {word(name)} ({names}), expected one; name it by a pattern")
-        fields[name] = found if several else str(found[0]) if name == "cage" else found[0]
+        one = next(iter(found))
+        fields[name] = found if several else str(one) if name == "cage" else one
     return replace(options, **fields)
 
 

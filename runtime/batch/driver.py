@@ -77,7 +77,8 @@ class Driver:
             if job.problem:
                 self.content[job.name] = job.content()
                 self.note(job, {"status": "failed", "error": job.problem})
-        queue = [job for job in reversed(jobs) if not job.problem]
+        # the largest first: one that is begun last would keep the others waiting
+        queue = sorted((job for job in reversed(jobs) if not job.problem), key=lambda job: job.size)
         with interrupts() as stop:
             try:
                 while (queue and not stop.count) or crew.running():

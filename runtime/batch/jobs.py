@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..cli.runfile import Run
 from ..errors import InputError, MissingFileError
+from ..io.companions import companions
 from ..options.unwrap import Options, Outputs
 from .assets import assets_of
 from .beside import Beside, folders_of
@@ -40,9 +41,18 @@ class Job:
         facts |= ({"strict": True} if run.strict else {}) | ({"problem": self.problem} if self.problem else {})
         return hashlib.sha256(json.dumps(facts, sort_keys=True, default=_named).encode()).hexdigest()[:16]
 
+    @property
+    def size(self) -> int:
+        """Bytes of the file, by which it is guessed how long it takes; 0 where it can't be read."""
+        try:
+            return self.run.mesh.stat().st_size
+        except (OSError, ValueError):
+            return 0
+
     def content(self) -> str:
-        """A fingerprint of the file, and of those that its options name; empty where it can't be read."""
-        prints = [_content(path) for path in (self.run.mesh, *self.beside)]
+        """A fingerprint of the file, of those it names, and of those that its options name; empty for one not read."""
+        given = (self.run.mesh, *self.beside)
+        prints = [_content(file) for path in given for file in (path, *companions(path))]
         return prints[0] if len(prints) == 1 else hashlib.sha256("".join(prints).encode()).hexdigest()
 
 

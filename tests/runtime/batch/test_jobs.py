@@ -184,6 +184,33 @@ def test_shards_share_all_assets(tmp_path: Path) -> None:
     assert sorted(name for part in parts for name in part) == [job.name for job in jobs]
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "beside"),
+    [
+        ("a.obj", f"mtllib a b.mtl\n{TRIANGLE}", {"a b.mtl": "newmtl m\nmap_Kd -s 1 1 1 x.png\n", "x.png": ""}),
+        ("a.gltf", '{"buffers": [{"uri": "a%20b.bin"}], "images": [{"uri": "x.png"}]}', {"a b.bin": "", "x.png": ""}),
+    ],
+)
+def test_a_file_that_an_asset_names_is_part_of_its_content(
+    name: str, text: str, beside: dict[str, str], tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    (job,) = jobs_of(tmp_path / name)
+    seen = {job.content()}
+    for other, content in beside.items():
+        (tmp_path / other).write_text(content, encoding="utf-8")
+        seen.add(job.content())
+    (tmp_path / "x.png").write_text("other", encoding="utf-8")
+    seen.add(job.content())
+    assert len(seen) == 4
+
+
+@pytest.mark.parametrize("text", ["[" * 50_000, "[]", '{"buffers": 3}', '{"images": [3, {"uri": 4}]}', "\xff"])
+def test_what_names_nothing_has_a_content_all_the_same(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.gltf").write_text(text, encoding="latin-1")
+    assert jobs_of(tmp_path / "a.gltf")[0].content() != ""
+
+
 def test_options_and_content_have_fingerprints(tmp_path: Path) -> None:
     path = mesh(tmp_path / "a.obj")
     (one,) = jobs_of(path)
