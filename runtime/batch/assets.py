@@ -76,7 +76,7 @@ def _in_folder(place: Path, output: Path, note: Noted) -> dict[Path, str]:
     files = [file for file in every if file.suffix.lower() in ENDINGS and file.is_file()]
     others = Counter(file.suffix.lower() for file in every if file.suffix.lower().lstrip(".") in CONVERTED)
     for ending, count in others.items():
-        note(f"{place}: {count} files {ending} are passed over; {CONVERTED[ending.lstrip('.')]}")
+        note(f"{place}: {count} {ending} passed over; {CONVERTED[ending.lstrip('.')]}")
     results = {folder: written_in(folder) for folder in {file.parent for file in files}}
     sources = [file for file in files if file.name not in results[file.parent]]
     if len(sources) < len(files):

@@ -125,9 +125,9 @@ def done_by_crew(jobs: list[Job], manifest: Path, batch: BatchOptions, console: 
         if entry.status == "failed":
             complain(f"{entry.asset}: {entry.error}", 2)
         else:
-            console.note(
-                f"{place}/{len(jobs)} {entry.asset}: {entry.metrics.get('charts')} charts, {entry.seconds:.1f} s"
-            )
+            charts = entry.metrics.get("charts")
+            made = f"{charts} chart{'' if charts == 1 else 's'}, {entry.seconds:.1f} s"
+            console.note(f"{place}/{len(jobs)} {entry.asset}: {made}")
 
     able = sum(not job.problem for job in jobs)
     return not jobs or Driver(manifest, __version__, limits, told).run(jobs, crew_of(batch, limits, able))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from .limits import limits
+from .pictures.pictures import found_in_folder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,31 +22,33 @@ PICTURE = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump|disp|decal|refl)[ \t]+([^\r\
 
 
 def companions(path: Path) -> list[Path]:
-    """The files that a mesh file names and that are there, each once; none for a file that can't be read."""
-    kind = path.suffix.lower()
+    """The files in its folder that a mesh file names, each once; none for a file that can't be read."""
+    kind, folder = path.suffix.lower(), path.parent
     if kind not in (".gltf", ".obj"):
         return []
     try:
-        if not 0 < path.stat().st_size <= limits().bytes or not path.is_file():
+        if not path.is_file() or path.stat().st_size > limits().bytes:
             return []
-        found = _of_gltf(path) if kind == ".gltf" else _of_obj(path)
-        return [file for file in dict.fromkeys(found) if file.is_file()]
+        if kind == ".gltf":
+            return _there(folder, _of_gltf(path))
+        libraries = _there(folder, _named(LIBRARY, path))
+        pictures = [name for library in libraries for name in _named(PICTURE, library)]
+        return list(dict.fromkeys([*libraries, *_there(folder, pictures)]))
     except (OSError, ValueError, RecursionError):  # reading it will say what is wrong
         return []
 
 
-def _of_gltf(path: Path) -> list[Path]:
+def _there(folder: Path, names: list[str]) -> list[Path]:
+    found = [found_in_folder(folder, name) for name in dict.fromkeys(names)]
+    return [file for file in dict.fromkeys(found) if file is not None]
+
+
+def _of_gltf(path: Path) -> list[str]:
     tree = json.loads(path.read_bytes())
     lists = [tree.get(name) for name in ("buffers", "images")] if isinstance(tree, dict) else []
     parts = [part for entry in lists if isinstance(entry, list) for part in entry if isinstance(part, dict)]
     names = [part["uri"] for part in parts if isinstance(part.get("uri"), str)]
-    return [path.parent / unquote(name) for name in names if not name.startswith("data:")]
-
-
-def _of_obj(path: Path) -> list[Path]:
-    libraries = [path.parent / name for name in _named(LIBRARY, path)]
-    there = [library for library in libraries if library.is_file()]
-    return [*libraries, *(library.parent / name for library in there for name in _named(PICTURE, library))]
+    return [unquote(name) for name in names if not name.startswith("data:")]
 
 
 def _named(pattern: re.Pattern[bytes], path: Path) -> list[str]:

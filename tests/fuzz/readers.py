@@ -37,18 +37,22 @@ class Reader:
 
 
 def read_any(path: Path) -> object:
-    """As `unwrap` reads: a mesh, or a cloud."""
+    """As `unwrap` reads: a mesh, or a cloud; and as a batch asks which files it names."""
     from flexpara.runtime.io.anyfile import load_any
+    from flexpara.runtime.io.companions import companions
 
+    companions(path)
     return load_any(path)
 
 
 def read_scene(path: Path) -> object:
     """As `unwrap` and `bake` read a scene: its meshes once, all instances, all columns of its vertices."""
+    from flexpara.runtime.io.companions import companions
     from flexpara.runtime.io.gltf.columns import primitive_columns
     from flexpara.runtime.io.gltf.editing import Editing
     from flexpara.runtime.io.meshfile import load_asset
 
+    companions(path)
     load_asset(path, instances=True)
     asset = load_asset(path)
     assert asset.document is not None
@@ -121,9 +125,11 @@ def read_batch(path: Path) -> object:
 def read_list(path: Path) -> object:
     """As `batch` reads a list of assets."""
     from flexpara.runtime.batch.jobs import find_jobs
+    from flexpara.runtime.cli.runfile import facts_of
     from flexpara.runtime.options.unwrap import Options, Outputs
 
-    return [job.asked("1") for job in find_jobs([path], path.parent / "out", Options(), Outputs())]
+    jobs = find_jobs([path], path.parent / "out", Options(), Outputs())
+    return [(job.asked("1"), json.dumps(facts_of(job.run))) for job in jobs]
 
 
 def read_checkpoint(path: Path) -> object:

@@ -164,6 +164,8 @@ def corpus(*endings: str) -> list[bytes]:
 
 LIST = b"""{"file": "a.obj"}
 {"file": "b/c.obj", "options": {"charts": 3, "maps": "ao", "size": 64, "rotation": "off"}}
+{"file": "d.gltf", "options": {"high": ["e/{stem}.obj"], "cage": 0.1, "match_names": true, "cut": "g.txt"}}
+{"file": "h.obj", "options": {"start": "{folder}/{stem}_*.obj", "protect": "_weight", "fields": "i.onnx"}}
 """
 
 

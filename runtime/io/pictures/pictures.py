@@ -36,12 +36,14 @@ def read_in_folder(folder: Path, name: str) -> bytes | None:
 
     OBJ files often name folders of their author's machine: those are looked for beside the mesh by base name.
     """
+    path = found_in_folder(folder, name)
+    return None if path is None else path.read_bytes()
+
+
+def found_in_folder(folder: Path, name: str) -> Path | None:
+    """The file that `read_in_folder` reads."""
     base = PureWindowsPath(name.strip()).name
-    for candidate in (name.strip(), base):
-        path = inside(folder, candidate)
-        if path is not None:
-            return path.read_bytes()
-    return None
+    return inside(folder, name.strip()) or inside(folder, base)
 
 
 def inside(folder: Path, name: str) -> Path | None:

@@ -111,8 +111,8 @@ def test_hidden_files_are_no_assets_and_formats_that_are_not_read_are_named_with
     said: list[str] = []
     found = find_jobs([tmp_path], tmp_path / "out", Options(), Outputs(), said.append)
     assert [job.name for job in found] == ["a.obj"]
-    assert sorted(said)[0].startswith(f"{tmp_path}: 1 files .blend are passed over; Blender's own files are not read")
-    assert sorted(said)[1].startswith(f"{tmp_path}: 2 files .fbx are passed over; FBX, a format without")
+    assert sorted(said)[0].startswith(f"{tmp_path}: 1 .blend passed over; Blender's own files are not read")
+    assert sorted(said)[1].startswith(f"{tmp_path}: 2 .fbx passed over; FBX, a format without")
 
 
 def test_a_folder_that_holds_itself_is_searched_once(tmp_path: Path) -> None:
