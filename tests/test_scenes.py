@@ -56,6 +56,8 @@ def test_what_obj_cannot_hold_is_said_line_by_line(
     assert main(argv) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "note" in line]
     said = ("1 animation left out", "1 skin left out", "1 morph target left out", "1 camera", "1 light")
+    said += ("4 nodes of the scene joined", "1 attribute of vertices", "1 uv set beside", "extras of 3 objects")
+    said += ("1 extension of glTF", "1 picture of materials")
     assert all(any(fact in line for line in lines) for fact in said)
     report = json.loads((tmp_path / "out" / "scene.report.json").read_text(encoding="utf-8"))
     assert report["changes"]["skipped_animations"] == 1

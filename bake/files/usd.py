@@ -1,60 +1,72 @@
-"""A .usda file: the atlas as one UsdGeomMesh with primvar st and a UsdPreviewSurface that reads the baked textures.
+"""A .usda file: meshes with primvar st in the tree of the scene's nodes, and materials that read the baked textures.
 
 n atlas vertices · f faces.  Written as text, so that no USD library is needed.  st is uv as it stands: USD's origin is
-the lower left corner, v up.  Colours are read as sRGB, everything else raw; 8-bit normals are scaled by 2 and moved by
-−1, as the specification of UsdPreviewSurface asks.  Positions are float32; the unit of the source is taken for a metre.
+the lower left corner, v up.  Positions are float32; the unit of the source is taken for a metre.
 """
 
 from __future__ import annotations
 
-import re
+from textwrap import indent
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.io.loops import Loops, loops_of
-from ...runtime.material import Material, used_materials
+from ...runtime.io.pictures.colors import source_colors
+from ...runtime.material import used_materials
+from ..colors.color import linear_from_srgb
 from ..maps.material import emissive_strength
+from .usdmaterial import Shown, distinct, material_text, prim_name
+from .usdshapes import shapes_of
+from .usdtree import MATERIALS, Prim, plain_tree, scene_tree
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Asset, Atlas
+    from .usdshapes import Shape
 
-COLOR, DATA = "sRGB", "raw"
-INPUTS: dict[str, tuple[tuple[str, str, str, str], ...]] = {
-    "base-color": (("diffuseColor", "color3f", "rgb", COLOR),),
-    "emissive": (("emissiveColor", "color3f", "rgb", COLOR),),
-    "normal": (("normal", "normal3f", "rgb", DATA),),
-    "occlusionRoughnessMetallic": (
-        ("occlusion", "float", "r", DATA),
-        ("roughness", "float", "g", DATA),
-        ("metallic", "float", "b", DATA),
-    ),
-}
-"""Product of the target usd → inputs of UsdPreviewSurface: name, type, channels, colour space."""
+INSET = "    "
+BY_VERTEX = '(\n            interpolation = "vertex"\n        )'
 
 
-def write_usda(atlas: Atlas, asset: Asset, textures: Mapping[str, str], path: Path, *, alpha: bool = False) -> None:
-    """Write the mesh and a material that names texture files beside it.
+def write_usda(
+    atlas: Atlas, asset: Asset, textures: Mapping[str, str], path: Path, *, alpha: bool = False
+) -> list[Shape]:
+    """Write the meshes and materials that name texture files beside the file.
 
     Args:
         atlas: what is written.
-        asset: source of the name and of the factors that no texture holds.
+        asset: source of names, of the tree of nodes, of colours, and of the factors that no texture holds.
         textures: product of `targets.USD` → file name in the same folder; products without a slot are left out.
         path: ends in .usda.
         alpha: whether the base colour has four channels, which are read as opacity.
+
+    Returns: what each Mesh has, in the order of the file.
     """
-    path.write_text(usda_text(atlas, asset, textures, alpha=alpha), encoding="utf-8")
+    text, shapes = usda_text(atlas, asset, textures, alpha=alpha)
+    path.write_text(text, encoding="utf-8")
+    return shapes
 
 
-def usda_text(atlas: Atlas, asset: Asset, textures: Mapping[str, str], *, alpha: bool = False) -> str:
-    """The text of the file; same arguments, same text.  Arguments as `write_usda`."""
-    root = prim_name(asset.stem)
-    return f"""#usda 1.0
+def usda_text(
+    atlas: Atlas, asset: Asset, textures: Mapping[str, str], *, alpha: bool = False
+) -> tuple[str, list[Shape]]:
+    """The text of the file, and what each of its meshes has; same arguments, same text.  Arguments as `write_usda`."""
+    root, shapes = prim_name(asset.stem), shapes_of(atlas, asset)
+    used = dict(zip(_numbers(asset), used_materials(asset) or [None], strict=True))
+    names = distinct("material" if entry is None else entry.name for entry in used.values())
+    paths = {number: f"/{root}/{MATERIALS}/{name}" for number, name in zip(used, names, strict=True)}
+    prims = [Prim(shape, list(_mesh_lines(atlas, asset, shape, paths))) for shape in shapes]
+    document = asset.document
+    tree = plain_tree(root, prims) if document is None else scene_tree(root, prims, document)
+    shown = Shown(textures, alpha=alpha, strength=emissive_strength(asset) if "emissive" in textures else 1.0)
+    materials = [indent(material_text(paths[number], entry, shown), INSET) for number, entry in used.items()]
+    ends = "\n\n".join(materials)
+    body = "\n".join(tree.lines)
+    text = f"""#usda 1.0
 (
     defaultPrim = "{root}"
     doc = "flexpara"
@@ -66,135 +78,60 @@ def Xform "{root}" (
     kind = "component"
 )
 {{
-    def Mesh "mesh" (
-        prepend apiSchemas = ["MaterialBindingAPI"]
-    )
-    {{
-{_mesh_lines(atlas, loops_of(atlas, asset))}
-        rel material:binding = </{root}/material>
-        uniform token subdivisionScheme = "none"
-    }}
+{body}
 
-{_material_text(root, asset, textures, alpha=alpha)}
+    def Scope "{MATERIALS}"
+    {{
+{ends}
+    }}
 }}
 """
+    return text, tree.written
 
 
-def prim_name(text: str) -> str:
-    """An identifier that USD accepts: ASCII letters, digits and _, no digit first."""
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", text) or "mesh"
-    return f"_{plain}" if plain[0].isdigit() else plain
+def _numbers(asset: Asset) -> list[int]:
+    """Which of the asset's materials its faces have; 0 where they don't say."""
+    if not asset.materials or asset.face_material is None:
+        return [0]
+    return np.unique(asset.face_material).tolist()
 
 
-def _mesh_lines(atlas: Atlas, loops: Loops) -> str:
-    """Attributes of the mesh."""
-    low, high = atlas.positions.min(axis=0), atlas.positions.max(axis=0)
-    counts = ", ".join(map(str, loops.size.tolist()))
-    lines = [
-        f"float3[] extent = [{_tuples(np.stack([low, high]))}]",
-        f"int[] faceVertexCounts = [{counts}]",
-        f"int[] faceVertexIndices = [{', '.join(map(str, loops.vertex.tolist()))}]",
-        f"point3f[] points = [{_tuples(atlas.positions)}]",
-        f'normal3f[] normals = [{_tuples(atlas.normals)}] (\n            interpolation = "vertex"\n        )',
-        f'texCoord2f[] primvars:st = [{_tuples(atlas.uv)}] (\n            interpolation = "vertex"\n        )',
-    ]
-    return "\n".join(f"        {line}" for line in lines)
+def _mesh_lines(atlas: Atlas, asset: Asset, shape: Shape, paths: Mapping[int, str]) -> Iterator[str]:
+    """Attributes of a mesh, and its subsets where it has several materials."""
+    positions = shape.positions(atlas)
+    yield f"float3[] extent = [{_tuples(np.stack([positions.min(axis=0), positions.max(axis=0)]))}]"
+    yield f"int[] faceVertexCounts = [{', '.join(map(str, shape.size.tolist()))}]"
+    yield f"int[] faceVertexIndices = [{', '.join(map(str, shape.corner.tolist()))}]"
+    yield f"point3f[] points = [{_tuples(positions)}]"
+    yield f"normal3f[] normals = [{_tuples(shape.normals(atlas))}] {BY_VERTEX}"
+    yield f"texCoord2f[] primvars:st = [{_tuples(atlas.uv[shape.used])}] {BY_VERTEX}"
+    if asset.colors is not None:
+        colors = source_colors(atlas, asset.colors)[shape.used] / 255.0
+        yield f"color3f[] primvars:displayColor = [{_tuples(linear_from_srgb(colors[:, :3]))}] {BY_VERTEX}"
+        if colors[:, 3].min() < 1.0:
+            opacity = ", ".join(f"{value:.9g}" for value in colors[:, 3].tolist())
+            yield f"float[] primvars:displayOpacity = [{opacity}] {BY_VERTEX}"
+    yield 'uniform token subdivisionScheme = "none"'
+    materials = np.unique(shape.material).tolist()
+    if len(materials) == 1:
+        yield f"rel material:binding = <{paths[materials[0]]}>"
+        return
+    yield 'uniform token subsetFamily:materialBind:familyType = "partition"'
+    names = distinct(paths[number].rpartition("/")[2] for number in materials)
+    for number, name in zip(materials, names, strict=True):
+        rows = ", ".join(map(str, np.flatnonzero(shape.material == number).tolist()))
+        yield f'def GeomSubset "{name}" ('
+        yield '    prepend apiSchemas = ["MaterialBindingAPI"]'
+        yield ")"
+        yield "{"
+        yield '    uniform token elementType = "face"'
+        yield '    uniform token familyName = "materialBind"'
+        yield f"    int[] indices = [{rows}]"
+        yield f"    rel material:binding = <{paths[number]}>"
+        yield "}"
 
 
 def _tuples(rows: NDArray[np.floating]) -> str:
     """(m, c) numbers as "(a, b), (c, d)", with the digits that float32 has."""
     pattern = "(" + ", ".join(["%.9g"] * rows.shape[1]) + ")"
     return ", ".join([pattern] * len(rows)) % tuple(rows.astype(np.float32).reshape(-1).tolist())
-
-
-def _material_text(root: str, asset: Asset, textures: Mapping[str, str], *, alpha: bool) -> str:
-    """The material: a preview surface, a reader of st, and one texture reader a file."""
-    base = f"/{root}/material"
-    inputs, readers = _connected(base, asset, textures, alpha=alpha)
-    surface = "\n".join(f"            {line}" for line in inputs.values())
-    return f"""    def Material "material"
-    {{
-        token outputs:surface.connect = <{base}/surface.outputs:surface>
-
-        def Shader "surface"
-        {{
-            uniform token info:id = "UsdPreviewSurface"
-{surface}
-            token outputs:surface
-        }}
-
-        def Shader "st"
-        {{
-            uniform token info:id = "UsdPrimvarReader_float2"
-            string inputs:varname = "st"
-            float2 outputs:result
-        }}
-{"".join(readers)}    }}"""
-
-
-def _connected(
-    base: str, asset: Asset, textures: Mapping[str, str], *, alpha: bool
-) -> tuple[dict[str, str], list[str]]:
-    """Input → line of the surface, by factors or connected to a texture; and the texture readers."""
-    known = {product: name for product, name in textures.items() if product in INPUTS}
-    inputs, readers = _factors(asset, set(known)), []
-    for product, name in known.items():
-        reader = prim_name(product)
-        outputs = {channels: kind for _, kind, channels, _ in INPUTS[product]}
-        for slot, kind, channels, _ in INPUTS[product]:
-            inputs[slot] = f"{kind} inputs:{slot}.connect = <{base}/{reader}.outputs:{channels}>"
-        if product == "base-color" and alpha:
-            outputs["a"] = "float"
-            inputs["opacity"] = f"float inputs:opacity.connect = <{base}/{reader}.outputs:a>"
-            inputs.update(_cutoff(asset))
-        scale = emissive_strength(asset) if product == "emissive" else 1.0
-        readers.append(_reader_text(base, reader, name, product, outputs, scale))
-    return inputs, readers
-
-
-def _factors(asset: Asset, products: set[str]) -> dict[str, str]:
-    """Input → line, for what no texture holds."""
-    used = used_materials(asset)
-    finishes = {entry.finish for entry in used}
-    metallic, roughness = finishes.pop() if len(finishes) == 1 else Material().finish
-    lines: dict[str, str] = {}
-    if "occlusionRoughnessMetallic" not in products:
-        lines["metallic"] = f"float inputs:metallic = {metallic:.9g}"
-        lines["roughness"] = f"float inputs:roughness = {roughness:.9g}"
-    glows = {entry.emissive for entry in used}
-    if len(glows) == 1 and "emissive" not in products:
-        lines["emissiveColor"] = "color3f inputs:emissiveColor = ({:.9g}, {:.9g}, {:.9g})".format(*glows.pop())
-    if len(used) == 1 and "base-color" not in products:
-        red, green, blue, opacity = used[0].base_color_factor
-        lines["diffuseColor"] = f"color3f inputs:diffuseColor = ({red:.9g}, {green:.9g}, {blue:.9g})"
-        if opacity < 1.0:
-            lines["opacity"] = f"float inputs:opacity = {opacity:.9g}"
-    return lines
-
-
-def _cutoff(asset: Asset) -> dict[str, str]:
-    """The threshold of opacity where every material is cut: the map is scaled so that it lies at ½."""
-    modes = {entry.alpha_mode for entry in used_materials(asset)}
-    masked = "MASK" in modes and "BLEND" not in modes
-    return {"opacityThreshold": "float inputs:opacityThreshold = 0.5"} if masked else {}
-
-
-def _reader_text(base: str, reader: str, name: str, product: str, outputs: Mapping[str, str], scale: float) -> str:
-    """One UsdUVTexture; scale multiplies its colours."""
-    quote = "@@@" if "@" in name else "@"
-    lines = [
-        'uniform token info:id = "UsdUVTexture"',
-        f"asset inputs:file = {quote}{name}{quote}",
-        f'token inputs:sourceColorSpace = "{INPUTS[product][0][3]}"',
-        f"float2 inputs:st.connect = <{base}/st.outputs:result>",
-        'token inputs:wrapS = "clamp"',
-        'token inputs:wrapT = "clamp"',
-    ]
-    if product == "normal":
-        lines += ["float4 inputs:scale = (2, 2, 2, 1)", "float4 inputs:bias = (-1, -1, -1, 0)"]
-    elif scale != 1.0:
-        lines.append(f"float4 inputs:scale = ({scale:.9g}, {scale:.9g}, {scale:.9g}, 1)")
-    types = {"rgb": "float3", "r": "float", "g": "float", "b": "float", "a": "float"}
-    lines += [f"{types[channels]} outputs:{channels}" for channels in outputs]
-    body = "\n".join(f"            {line}" for line in lines)
-    return f'\n        def Shader "{reader}"\n        {{\n{body}\n        }}\n'

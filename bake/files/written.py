@@ -11,6 +11,7 @@ import json
 import re
 import struct
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,9 +64,9 @@ class Reading:
     """What is read of files.
 
     apart: whether no two triangles are known to overlap; files that hold the same are not tested again.
-    parts: of glTF files, in the order of the faces.  fans: (g, 3, 2) uv of other files, whose polygons are read as fans
-    from their first corner; None where all are triangles.  faces: (f,) int64 of triangles in them, None is all.
-    most: faces of a file that is read.
+    parts: of files with several meshes, in the order of the faces.  fans: (g, 3, 2) uv of other files, whose polygons
+    are read as fans from their first corner; None where all are triangles.  faces: (f,) int64 of triangles in them,
+    None is all.  most: faces of a file that is read.
     """
 
     apart: bool = False
@@ -126,12 +127,12 @@ def serialized(corner_uv: NDArray[np.float32], kind: str) -> NDArray[np.float64]
 def corner_uv_of(path: Path, reading: Reading | None = None) -> NDArray[np.float64]:
     """(f, 3, 2) float64 v up of a .glb, .gltf, .obj, .ply or .usda file.
 
-    reading: the parts of a glTF file, or the faces of another, that are read; None is one mesh, all of it.
+    reading: the parts of a glTF or USD file, or the faces of another, that are read; None is one mesh, all of it.
 
     Raises: MeshError for another ending or a file without such uv.
     """
     reading = reading or Reading()
-    readers = {".obj": _obj_uv, ".ply": _ply_uv, ".usda": _usda_uv}
+    readers = {".obj": _obj_uv, ".ply": _ply_uv, ".usda": partial(_usda_uv, parts=reading.parts)}
     if path.suffix not in (*readers, ".glb", ".gltf"):
         known = ", ".join((".glb", ".gltf", *readers))
         raise MeshError(f"{path.name}: expected one of {known}; name a mesh file that flexpara wrote")
@@ -211,13 +212,15 @@ def _ply_uv(data: bytes) -> NDArray[np.float64]:
     return np.column_stack([table["s"], table["t"]]).astype(np.float64)[faces]
 
 
-def _usda_uv(data: bytes) -> NDArray[np.float64]:
-    """Attributes primvars:st and faceVertexIndices of the one mesh."""
+def _usda_uv(data: bytes, parts: Sequence[PartUv]) -> NDArray[np.float64]:
+    """Attributes primvars:st and faceVertexIndices of all meshes; parts: which of them wind the other way."""
     text = data.decode("utf-8")
     names = ("faceVertexCounts", "faceVertexIndices", "primvars:st")
-    count, index, st = (re.search(rf"{name} = \[([^\]]*)\]", text) for name in names)
-    if count is None or index is None or st is None:
-        raise ValueError("no faceVertexCounts, faceVertexIndices or primvars:st")
-    numbers = np.array(re.findall(r"[-+.\deE]+", st[1]), np.float32).astype(np.float64)
-    size, corner = (np.array(found[1].split(","), np.int64) for found in (count, index))
-    return numbers.reshape(-1, 2)[_fans(size, corner)]
+    count, index, st = (re.findall(rf"{name} = \[([^\]]*)\]", text) for name in names)
+    found = []
+    for sizes, corners, uv, part in zip(count, index, st, parts, strict=True):
+        numbers = np.array(re.findall(r"[-+.\deE]+", uv), np.float32).astype(np.float64)
+        size, corner = (np.array(numbers_of.split(","), np.int64) for numbers_of in (sizes, corners))
+        faces = _fans(size, corner)
+        found.append(numbers.reshape(-1, 2)[faces[:, [0, 2, 1]] if part.mirrored else faces])
+    return np.concatenate(found)

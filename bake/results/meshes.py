@@ -13,8 +13,8 @@ import numpy as np
 
 from ...runtime.extras import requires
 from ...runtime.io.formats.npz import write_npz
-from ...runtime.io.gltf.instances import every_instance
-from ...runtime.io.loops import loops_of
+from ...runtime.io.gltf.instances import every_instance, instance_faces
+from ...runtime.io.loops import first_faces, loops_of
 from ...runtime.material import used_materials
 from ...runtime.options.unwrap import SCENES
 
@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from ...runtime.files import OutputFolder
     from ...runtime.mesh import Asset, Atlas
     from ...runtime.options.unwrap import Outputs
+    from ..files.usdshapes import Shape
     from ..texture import Texture
 
 USD_KEYS = {"orm": "occlusionRoughnessMetallic"}
@@ -49,15 +52,16 @@ class MeshJob:
 
 def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> dict[str, dict[str, Any]]:
     """The mesh in each format asked for; what was read back of it, format → fields of `written.WrittenUv`."""
+    source, shapes = job.asset, []
     job = replace(job, asset=_as_scene(job.asset, job.outputs))
     spread, own = every_instance(job.atlas, job.asset)
     flat = replace(job, atlas=spread)
     writers: dict[str, Callable[[Path], None]] = {
         "glb": lambda path: _write_gltf(job, path),
         "gltf": lambda path: _write_gltf(job, path),
-        "obj": lambda path: _write_obj(flat, path),
+        "obj": lambda path: _write_obj(flat, path, instance_faces(job.asset)),
         "ply": lambda path: _write_ply(flat, path),
-        "usda": lambda path: _write_usda(flat, path),
+        "usda": lambda path: shapes.extend(_write_usda(replace(job, asset=source), path)),
         "npz": lambda path: write_npz(spread, job.asset, path),
     }
     staged: dict[str, Path] = {}
@@ -74,11 +78,12 @@ def write_meshes(output: OutputFolder, job: MeshJob, *, apart: bool = False) -> 
     uv = job.atlas.uv[job.atlas.faces]
     order, parts = parts_of(job.asset, job.outputs.uv_set or 0)
     scenes = {kind: path for kind, path in staged.items() if kind in SCENES}
-    plain = {kind: path for kind, path in staged.items() if kind not in SCENES}
+    plain = {kind: path for kind, path in staged.items() if kind not in (*SCENES, "usda")}
     fans = spread.uv[loops_of(spread, job.asset).triangles]
     return {
         **written_report(scenes, uv[order], Reading(apart=apart, parts=parts)),
         **written_report(plain, uv, Reading(apart=apart, fans=fans, faces=own)),
+        **({"usda": _usda_report(staged["usda"], job.atlas, shapes, apart=apart)} if "usda" in staged else {}),
     }
 
 
@@ -127,13 +132,20 @@ def _write_scene(jobs: Sequence[MeshJob], path: Path) -> None:
     write_scene([Page(job.atlas, job.asset, job.textures, job.outputs.uv_set) for job in jobs], path)
 
 
-def _write_obj(job: MeshJob, path: Path) -> None:
-    """The source's own lines where it is an OBJ file; with materials that name the pictures."""
+def _write_obj(job: MeshJob, path: Path, faces: NDArray[np.int64]) -> None:
+    """The source's own lines where it is an OBJ file; with materials that name the pictures, or vertex colours.
+
+    faces: (f,) which of the asset's faces each of the atlas is.
+    """
     shown = next((job.files[name] for name in SHOWN if name in job.files), None)
     if job.asset.obj is None:
+        from ...runtime.io.obj.named import named
         from ...runtime.io.obj.write import write_obj
 
-        write_obj(job.atlas, path, texture=shown, loops=loops_of(job.atlas, job.asset))
+        loops = loops_of(job.atlas, job.asset)
+        names = named(job.asset, faces, first_faces(job.asset, loops), shown)
+        colors = job.asset.colors if shown is None else None
+        write_obj(job.atlas, path, texture=shown, colors=colors, loops=loops, names=names)
         return
     from ...runtime.io.obj.rewrite import rewrite_obj
 
@@ -148,11 +160,20 @@ def _write_ply(job: MeshJob, path: Path) -> None:
     write_ply(job.atlas, path, colors=job.asset.colors, loops=loops_of(job.atlas, job.asset))
 
 
-def _write_usda(job: MeshJob, path: Path) -> None:
-    """With a material that names the texture files beside it."""
+def _write_usda(job: MeshJob, path: Path) -> list[Shape]:
+    """With materials that name the texture files beside it; what each mesh in it has."""
     with requires("bake"):
         from ..files.usd import write_usda
     color = job.textures.get("base-color")
     alpha = color is not None and color.pixels.shape[2] == 4
     named = {USD_KEYS.get(name, name): file for name, file in job.files.items()}
-    write_usda(job.atlas, job.asset, named, path, alpha=alpha)
+    return write_usda(job.atlas, job.asset, named, path, alpha=alpha)
+
+
+def _usda_report(path: Path, atlas: Atlas, shapes: Sequence[Shape], *, apart: bool) -> dict[str, Any]:
+    """What was read back of a .usda file."""
+    from ..files.written import PartUv, Reading, written_report
+
+    uv = np.concatenate([atlas.uv[shape.triangles] for shape in shapes])
+    parts = [PartUv(mirrored=shape.mirrored) for shape in shapes]
+    return written_report({"usda": path}, uv, Reading(apart=apart, parts=parts))["usda"]

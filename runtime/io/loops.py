@@ -50,6 +50,16 @@ def loops_of(atlas: Atlas, asset: Asset) -> Loops:
     return _loops(atlas.faces, atlas.uv, asset.polygons)
 
 
+def first_faces(asset: Asset, loops: Loops) -> NDArray[np.int64]:
+    """(m,) the first of the triangles that each loop is of."""
+    if asset.polygons is None:
+        return loops.polygon
+    polygon = asset.polygons.of_faces
+    first = np.zeros(len(asset.polygons.size), np.int64)
+    first[polygon[::-1]] = np.arange(len(polygon))[::-1]
+    return first[loops.polygon]
+
+
 def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons) -> Loops:
     """Loops of faces (f, 3) whose corners are those of polygons; uv (n, 2) of the vertices."""
     corner, own = polygons.corner, np.full(int(polygons.size.sum()), -1, dtype=np.int64)

@@ -11,7 +11,7 @@ import json
 import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 
@@ -98,7 +98,8 @@ def read_resource(uri: str, folder: Path) -> bytes:
     if uri.startswith("data:"):
         head, _, body = uri.partition(",")
         try:
-            return base64.b64decode(body) if head.endswith(";base64") else unquote(body).encode("latin-1")
+            coded = head.lower().endswith(";base64")
+            return base64.b64decode(unquote(body), validate=False) if coded else unquote_to_bytes(body)
         except (binascii.Error, ValueError) as error:
             raise MeshError("a data URI of the glTF file is damaged; export it again") from error
     path = None if "://" in uri else inside(folder, unquote(uri))

@@ -25,20 +25,35 @@ def every_instance(atlas: Atlas, asset: Asset) -> tuple[Atlas, NDArray[np.int64]
     document, same = asset.document, np.arange(len(atlas.faces))
     if document is None or asset.part is None:
         return atlas, same
-    mesh_of = np.array([part.mesh for part in document.parts])[asset.part]
     world = {part.mesh: part.world for part in document.parts}
-    placements = standing(document.placements, set(world))
-    if len(placements) == len(world) and all(entry.world is world[entry.mesh] for entry in placements):
+    placed = faces_at_places(asset)
+    if len(placed) == len(world) and all(entry.world is world[entry.mesh] for entry, _ in placed):
         return atlas, same
     whole = replace(atlas, faces=np.zeros((0, 3), np.int64), face_chart=np.zeros(0, np.int64))
     pieces, place, count = [], np.zeros(len(same), np.int64), 0
-    for entry in placements:
-        own = np.flatnonzero(mesh_of == entry.mesh)
+    for entry, own in placed:
         pieces.append(_moved(atlas, own, entry.world @ np.linalg.inv(world[entry.mesh])))
         if entry.world is world[entry.mesh]:
             place[own] = count + np.arange(len(own))
         count += len(own)
     return _together(whole, pieces), place
+
+
+def faces_at_places(asset: Asset) -> list[tuple[Placement, NDArray[np.int64]]]:
+    """Each place where a mesh of the scene stands, with the faces (m,) of the asset that stand there."""
+    if asset.document is None or asset.part is None:
+        return []
+    mesh_of = np.array([part.mesh for part in asset.document.parts])[asset.part]
+    meshes = {part.mesh for part in asset.document.parts}
+    places = standing(asset.document.placements, meshes)
+    return [(entry, np.flatnonzero(mesh_of == entry.mesh)) for entry in places]
+
+
+def instance_faces(asset: Asset) -> NDArray[np.int64]:
+    """(f,) which of the asset's faces each face of `every_instance` is."""
+    placed = faces_at_places(asset)
+    several = sum(len(own) for _, own in placed) > len(asset.faces)
+    return np.concatenate([own for _, own in placed]) if several else np.arange(len(asset.faces))
 
 
 def standing(placements: tuple[Placement, ...], meshes: set[int]) -> list[Placement]:

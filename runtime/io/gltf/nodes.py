@@ -54,7 +54,7 @@ def placed_meshes(file: GltfFile) -> list[Placement]:
     nodes = file.tree.get("nodes", [])
     world: dict[int, NDArray[np.float64]] = {}
     placed: list[tuple[int, bool]] = []
-    for number, roots in enumerate(_scenes(file.tree)):
+    for number, roots in enumerate(scene_roots(file.tree)):
         found = _worlds(nodes, roots)
         placed += [(index, number == 0) for index in found if "mesh" in nodes[index] and index not in world]
         world |= {index: matrix for index, matrix in found.items() if index not in world}
@@ -101,7 +101,7 @@ def select_placements(tree: dict[str, Any], placements: Sequence[Placement], nam
     return [entry for entry in placements if entry.mesh in chosen]
 
 
-def _scenes(tree: dict[str, Any]) -> list[list[int]]:
+def scene_roots(tree: dict[str, Any]) -> list[list[int]]:
     """Root nodes of each scene, the default one first; without scenes all nodes that are nobody's child."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not scenes:
@@ -121,7 +121,7 @@ def _worlds(nodes: Sequence[dict[str, Any]], roots: Sequence[int]) -> dict[int, 
                 f"glTF node {index} has several parents or is its own ancestor, expected a tree; export again"
             )
         with np.errstate(over="ignore", invalid="ignore"):
-            world[index] = parent @ _local_matrix(nodes[index])
+            world[index] = parent @ local_matrix(nodes[index])
         if not np.isfinite(world[index]).all():
             raise MeshError(f"glTF node {index} stands beyond all numbers, expected finite ones; export the file again")
         waiting += [(child, world[index]) for child in reversed(nodes[index].get("children", []))]
@@ -140,7 +140,7 @@ def _standing(file: GltfFile, index: int, world: Mapping[int, NDArray[np.float64
     return [joint @ read_accessor(file, skin["inverseBindMatrices"])[0].reshape(4, 4).T]
 
 
-def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+def local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
     """(4, 4) float64, column vectors: T · R · S, or the matrix given (stored by columns)."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T

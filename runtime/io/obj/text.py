@@ -61,10 +61,29 @@ class ObjText:
         others = besides_tables(self.data)
         return Counter(keyword(line) for line in (self.statements.values() if others is None else others))
 
-    def beyond_meshes(self) -> dict[str, int]:
-        """What other formats have no word for: named objects and groups, smoothing groups, lines and points."""
+    @cached_property
+    def objects(self) -> tuple[NDArray[np.int64], list[str]]:
+        """(p,) number of the object of each polygon, or of the group where there are no objects, and their names.
+
+        The first name is "", for what stands before any.
+        """
+        kind = next((name for name in NAMING[:2] if self.beyond[name]), "")
+        if not kind:
+            return np.zeros(len(self.line), np.int64), [""]
+        named = {number: line for number, line in self.statements.items() if keyword(line) == kind}
+        names = ["", *("_".join(line.split()[1:]) for line in named.values())]
+        place = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        at = np.searchsorted(np.array(list(named)), self.line)
+        return np.array([place[name] for name in names], dtype=np.int64)[at], list(place)
+
+    def beyond_meshes(self, *, objects: bool = True) -> dict[str, int]:
+        """What other formats have no word for: named objects and groups, smoothing groups, lines and points.
+
+        objects: whether names of objects are among it, or of groups where there are no objects.
+        """
+        kept = "" if objects else next((name for name in NAMING[:2] if self.beyond[name]), "")
         counts = {
-            "skipped_names": sum(self.beyond[kind] for kind in NAMING),
+            "skipped_names": sum(self.beyond[kind] for kind in NAMING if kind != kept),
             "skipped_lines": self.beyond["l"],
             "skipped_points": self.beyond["p"],
         }

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import InputError
 from ...geometry.rows import by_first_appearance, equal_rows, first_of_each
 from ..pictures.colors import source_colors
+from .named import Named, plain_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from ...mesh import Atlas
     from ..loops import Loops
 
-MATERIAL = "atlas"
-
 
 def write_obj(
     atlas: Atlas,
@@ -32,8 +31,9 @@ def write_obj(
     texture: str | None = None,
     colors: NDArray[np.uint8] | None = None,
     loops: Loops | None = None,
+    names: Named | None = None,
 ) -> None:
-    """Write Wavefront OBJ, and `<stem>.mtl` beside it when there is a texture.
+    """Write Wavefront OBJ, and `<stem>.mtl` beside it when there is a texture or names have materials.
 
     One `v` per distinct position and one `vt` per atlas vertex, so that seams split uv and nothing else.  Positions
     stand in the order of the source file.  Numbers have the fewest digits that read back as the same float64.
@@ -45,6 +45,7 @@ def write_obj(
         colors: (source vertices, 4) uint8, those of the Asset that the atlas came from, or None: written behind the
             positions as red green blue in [0, 1] (a widespread extension; where vertices share a position, the first).
         loops: the polygons to write; None writes the triangles.
+        names: what stands between them; None is one material for the texture.
 
     Raises:
         InputError: the name of the texture or of the file would break the lines of the format.
@@ -60,28 +61,25 @@ def write_obj(
         columns.append(source_colors(atlas, colors)[first, :3] / 255.0)
     normal = equal_rows(atlas.normals.astype(np.float64))
     normals = atlas.normals[first_of_each(normal)].astype(np.float64)
-    head = ["# flexpara: uv are v up"]
-    if texture is not None:
-        head.append(f"mtllib {library.name}")
-    used = [] if texture is None else [f"usemtl {MATERIAL}"]
+    names = names or plain_names(texture)
+    head = ["# flexpara: uv are v up", *([f"mtllib {library.name}"] if names.library else [])]
     corner = atlas.faces.reshape(-1) if loops is None else loops.vertex
     words = [
         f"{v}/{vt}/{vn}" for v, vt, vn in (np.stack([vertex[corner], corner, normal[corner]], axis=1) + 1).tolist()
     ]
     size = [3] * len(atlas.faces) if loops is None else loops.size.tolist()
     end = list(accumulate(size))
-    faces = [f"f {' '.join(words[last - own : last])}" for own, last in zip(size, end, strict=True)]
+    faces = (f"f {' '.join(words[last - own : last])}" for own, last in zip(size, end, strict=True))
     lines = [
         *head,
         *_rows("v", np.hstack(columns)),
         *_rows("vt", atlas.uv.astype(np.float64)),
         *_rows("vn", normals),
-        *used,
-        *faces,
+        *(line for number, face in enumerate(faces) for line in (*names.marks.get(number, ()), face)),
     ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    if texture is not None:
-        library.write_text(f"newmtl {MATERIAL}\nKd 1 1 1\nd 1\nillum 1\nmap_Kd {texture}\n", encoding="utf-8")
+    if names.library:
+        library.write_text("\n".join(names.library) + "\n", encoding="utf-8")
 
 
 def _distinct_positions(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
