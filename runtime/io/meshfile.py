@@ -1,6 +1,6 @@
 """Mesh file → Asset.
 
-obj, ply, stl, off and glTF have readers of their own; all else goes through trimesh.  Positions are float64 in the
+obj, ply, stl, off, 3mf and glTF have readers of their own; all else goes through trimesh.  Positions are float64 in the
 units of the file; face i of the file is face i until cleaning drops some, polygons as triangles.  A file may come from
 anyone: it reaches nothing outside its folder, no network, and no pickle.
 """
@@ -19,6 +19,7 @@ from ..mesh import Asset
 from .clean.clean import clean
 from .formats.off import read_off
 from .formats.stl import read_stl
+from .formats.threemf import read_3mf
 from .gltf.scene import read_gltf
 from .limits import limits, raised
 from .obj.read import read_obj
@@ -146,6 +147,7 @@ def _read(data: bytes, path: Path, gltf: Callable[[], RawMesh]) -> RawMesh:
         "ply": lambda: read_ply(data, partial(read_in_folder, folder)),
         "stl": lambda: read_stl(data),
         "off": lambda: read_off(data),
+        "3mf": lambda: read_3mf(data),
         "glb": gltf,
         "gltf": gltf,
     }

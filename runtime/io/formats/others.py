@@ -1,4 +1,4 @@
-"""Formats without a reader of their own (3mf, dae, …) → RawMesh, by trimesh with its processing off.
+"""Formats without a reader of their own (dae, …) → RawMesh, by trimesh with its processing off.
 
 Triangles keep their order; quads become two triangles in the order that trimesh gives them.  What trimesh makes up
 (grey colours, averaged normals) is left out.  A file may come from anyone: it reaches nothing outside its folder, no
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import warnings
-import zipfile
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,10 +22,10 @@ from trimesh.resolvers import Resolver
 
 from ...errors import InputError, MeshError, MissingDependencyError
 from ...material import Material, Picture, seen_through
-from ..limits import limits, raised
 from ..pictures.colors import as_rgba
 from ..pictures.pictures import picture_pixels, read_in_folder
 from ..rawmesh import RawMesh, merge, transformed, unit_vectors
+from .archive import check_archive
 from .converted import CONVERTED
 
 if TYPE_CHECKING:
@@ -34,9 +35,18 @@ if TYPE_CHECKING:
 
 NOT_MESHES = frozenset({"json", "dict", "dict64", "msgpack", "xyz", "zip", "stl_ascii"})
 REMEDY = "pip install 'flexpara[formats]', or convert the file"
+COLLADA = {
+    "kept_axes": rb"<up_axis>\s*Z_UP",
+    "skipped_cameras": rb"<instance_camera\b",
+    "skipped_lights": rb"<instance_light\b",
+    "skipped_animations": rb"<animation\b",
+    "skipped_skins": rb"<instance_controller\b",
+    "skipped_morph_targets": rb"<morph\b",
+}
+"""What of a COLLADA file no mesh of trimesh says: change → how its elements begin."""
 MADE_UP_GREY = [102, 102, 102, 255]
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # its log would end on stderr
-ARCHIVES = frozenset({"3mf", "3dxml", "zae"})
+ARCHIVES = frozenset({"3dxml", "zae"})
 
 
 def read_with_trimesh(data: bytes, path: Path) -> RawMesh:
@@ -57,21 +67,8 @@ def read_with_trimesh(data: bytes, path: Path) -> RawMesh:
     if isinstance(loader, ExceptionWrapper):
         raise MissingDependencyError(f".{kind} needs packages that are absent; {REMEDY}")
     if kind in ARCHIVES:
-        _check_archive(data)
+        check_archive(data)
     return _read_with_trimesh(data, kind, path.parent)
-
-
-def _check_archive(data: bytes) -> None:
-    """Refuse an archive that unpacks to more than is read."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except zipfile.BadZipFile as error:
-        raise MeshError("the file is no zip archive, as its format asks; export it again") from error
-    most = limits()
-    most.demand_unpacked(size, len(data), "the archive")
-    if size > most.bytes:
-        raise MeshError(f"the file unpacks to {size} bytes, at most {most.bytes} are read; {raised('bytes')}")
 
 
 class _FolderResolver(Resolver):
@@ -114,7 +111,18 @@ def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
     if not parts:
         found = "points or lines only (give points as .ply, .xyz or .npy)" if others else "no face"
         raise MeshError(f"the file holds {found}, expected triangles; give a triangle mesh")
-    return merge(parts)
+    whole = merge(parts)
+    return replace(whole, changes={**whole.changes, **_unread(data, kind, len(parts))})
+
+
+def _unread(data: bytes, kind: str, parts: int) -> dict[str, int]:
+    """What trimesh passes over, name → count."""
+    counts = {"joined_nodes": parts if parts > 1 else 0}
+    if kind == "dae":
+        counts |= {name: len(re.findall(pattern, data)) for name, pattern in COLLADA.items()}
+        sizes = b" ".join(re.findall(rb"<vcount>([\d\s]*)</vcount>", data)).split()
+        counts["polygons_as_triangles"] = sum(size not in (b"0", b"1", b"2", b"3") for size in sizes)
+    return {name: count for name, count in counts.items() if count}
 
 
 def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh], int]:

@@ -18,6 +18,7 @@ from ..text import decode, number_table
 HEADER, RECORD = 84, 50
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corner", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(r"^[ \t]*vertex\b(.*)$", re.IGNORECASE | re.MULTILINE)
+_SOLID = re.compile(r"^[ \t]*solid\b", re.IGNORECASE | re.MULTILINE)
 _WORDS = re.compile(rb"\b(facet|vertex|endsolid)\b", re.IGNORECASE)
 
 
@@ -28,7 +29,8 @@ def read_stl(data: bytes) -> RawMesh:
         data: the bytes of the file.
 
     Returns:
-        Positions (3 f, 3), faces (f, 3).  Bytes behind the last triangle of a binary file are counted.
+        Positions (3 f, 3), faces (f, 3).  Counted are bytes behind the last triangle of a binary
+        file, and facets with attribute bytes, which some programs take for colours; and solids that are joined.
 
     Raises:
         MeshError: neither of both, cut off, without triangles, or with numbers that are none; it names the line.
@@ -53,7 +55,11 @@ def _binary(data: bytes, count: int) -> RawMesh:
     if count == 0:
         raise MeshError("the STL file holds 0 triangles; check the export")
     facets = np.frombuffer(data, dtype=_FACET, count=count, offset=HEADER)
-    return _soup(to_float64(facets["corner"].reshape(-1, 3)), len(data) - HEADER - RECORD * count)
+    changes = {
+        "trailing_bytes": len(data) - HEADER - RECORD * count,
+        "skipped_facet_values": int(np.count_nonzero(facets["attribute"])),
+    }
+    return _soup(to_float64(facets["corner"].reshape(-1, 3)), changes)
 
 
 def _ascii(data: bytes) -> RawMesh:
@@ -73,10 +79,11 @@ def _ascii(data: bytes) -> RawMesh:
             "off or damaged: export it again"
         )
     positions, _ = number_table(rows, numbers, 3, 3)
-    return _soup(positions, 0)
+    solids = len(_SOLID.findall(text))
+    return _soup(positions, {"joined_solids": solids if solids > 1 else 0})
 
 
-def _soup(positions: np.ndarray, trailing: int) -> RawMesh:
+def _soup(positions: np.ndarray, changes: dict[str, int]) -> RawMesh:
     faces = np.arange(len(positions), dtype=np.int64).reshape(-1, 3)
     flat = np.zeros(len(faces), dtype=np.int64)
-    return RawMesh(positions=positions, faces=faces, smoothing=flat, changes={"trailing_bytes": trailing})
+    return RawMesh(positions=positions, faces=faces, smoothing=flat, changes=changes)

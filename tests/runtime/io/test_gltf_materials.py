@@ -52,6 +52,16 @@ def test_every_slot_is_read() -> None:
     assert not any(changes.values())
 
 
+def test_a_webp_picture_is_read() -> None:
+    data = io.BytesIO()
+    Image.new("RGB", (2, 2), (0, 77, 0)).save(data, "WEBP", lossless=True)
+    webp = {"uri": "data:image/webp;base64," + base64.b64encode(data.getvalue()).decode()}
+    alone = {"extensions": {"EXT_texture_webp": {"source": 1}}}
+    (material,), changes = read(TEXTURES, textures=[alone, alone], images=[{"uri": picture_uri(10)}, webp])
+    assert material.pictures["base-color"].pixels[0, 0].tolist() == [0, 77, 0, 255]
+    assert not any(changes.values())
+
+
 def test_samplers_say_how_it_goes_on_outside() -> None:
     (material,), _ = read(TEXTURES)
     assert material.pictures["base-color"].wrap == ("repeat", "repeat")

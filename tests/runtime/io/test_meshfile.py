@@ -288,3 +288,20 @@ def test_formats_of_the_extra_come_in_with_their_triangles(tmp_path: Path, kind:
     assert len(found.faces) == 12
     np.testing.assert_allclose(np.sort(np.ptp(found.positions, axis=0)), [1.0, 2.0, 3.0], atol=1e-6)
     assert found.surface.face_areas().sum() == pytest.approx(22.0)
+
+
+def test_what_trimesh_passes_over_in_collada_is_counted(tmp_path: Path) -> None:
+    pytest.importorskip("collada")
+    box = trimesh.creation.box()
+    box.export(tmp_path / "box.dae")
+    text = (tmp_path / "box.dae").read_text(encoding="utf-8")
+    more = "<up_axis>Z_UP</up_axis>", "<!-- <instance_camera url='#c'/><animation id='a'/> <vcount>3 4 5</vcount> -->"
+    text = text.replace("<up_axis>Y_UP</up_axis>", more[0]) + more[1]
+    (tmp_path / "more.dae").write_text(text, encoding="utf-8")
+    found, plain = (load_asset(tmp_path / name).changes for name in ("more.dae", "box.dae"))
+    assert {name: count for name, count in found.items() if name not in plain} == {
+        "kept_axes": 1,
+        "skipped_cameras": 1,
+        "skipped_animations": 1,
+        "polygons_as_triangles": 2,
+    }

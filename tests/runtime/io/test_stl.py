@@ -13,8 +13,8 @@ from flexpara.runtime.io.formats.stl import read_stl
 CORNERS = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=np.float32)
 
 
-def binary(header: bytes = b"", count: int = 2) -> bytes:
-    records = [struct.pack("<3f", 0, 0, 1) + corner.astype("<f4").tobytes() + b"\1\2" for corner in CORNERS]
+def binary(header: bytes = b"", count: int = 2, attribute: bytes = b"\0\0") -> bytes:
+    records = [struct.pack("<3f", 0, 0, 1) + corner.astype("<f4").tobytes() + attribute for corner in CORNERS]
     return header.ljust(80, b" ")[:80] + struct.pack("<I", count) + b"".join(records)
 
 
@@ -39,7 +39,11 @@ def test_a_binary_file_of_the_right_size_is_binary_whatever_its_header(header: b
 def test_bytes_behind_the_last_triangle_are_counted() -> None:
     raw = read_stl(binary(b"solid") + b"made by hand")
     np.testing.assert_array_equal(raw.positions[raw.faces], CORNERS)
-    assert raw.changes == {"trailing_bytes": 12}
+    assert {name: count for name, count in raw.changes.items() if count} == {"trailing_bytes": 12}
+
+
+def test_attributes_of_facets_which_no_output_holds_are_counted() -> None:
+    assert read_stl(binary(attribute=b"\1\2")).changes["skipped_facet_values"] == 2
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -51,7 +55,10 @@ def test_ascii_files_read_in_any_case_and_encoding(end: str, encoding: str) -> N
 
 
 def test_all_solids_of_a_file_are_one_mesh() -> None:
-    assert len(read_stl((ascii("one") + ascii("two")).encode()).faces) == 4
+    raw = read_stl((ascii("one") + ascii("two")).encode())
+    assert len(raw.faces) == 4
+    assert raw.changes == {"joined_solids": 2}
+    assert read_stl(ascii("one").encode()).changes == {"joined_solids": 0}
 
 
 @pytest.mark.parametrize(
