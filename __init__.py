@@ -314,9 +314,11 @@ class UnwrapPages(Unwrapping):
         from .bake.results.output import with_cut
         from .bake.results.several import Several
         from .export.assemble import write_networks
+        from .runtime.io.asset.changes import lost
         from .runtime.process.progress import Clock
 
         clock, report = Clock(progress), {**self.report, "outputs": outputs.facts()}
+        report["changes"] = {**report["changes"], **lost(self.asset, outputs.for_asset(self.asset))}
         pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
         several = Several(self.asset, self.tile, pairs, outputs, seed)
         jobs = several.jobs(output)

@@ -28,7 +28,7 @@ from .bake.report.commands import report
 from .runtime.batch.commands import batch
 from .runtime.cli.commands import evaluate, query, sample
 from .runtime.cli.console import Console, Manners, complain
-from .runtime.cli.inputs import STREAM, from_stdin, meshes_of
+from .runtime.cli.inputs import STREAM, from_stdin, like_option, meshes_of
 from .runtime.cli.runfile import Run
 from .runtime.errors import FlexparaError, InputError
 from .runtime.extras import requires
@@ -114,8 +114,9 @@ def unwrap(
         from .runtime.cli.runfile import find_run
 
         return _perform(find_run(checkpoints.resume), console)
-    for word in (path for path in mesh if str(path).startswith("-") and path != STREAM):
-        raise InputError(f"unknown option {word}, expected those of flexpara unwrap; see flexpara unwrap --help")
+    for word in (str(path) for path in mesh if str(path).startswith("-") and path != STREAM):
+        remedy = like_option(word, app["unwrap"])
+        raise InputError(f"unknown option {word}, expected those of flexpara unwrap; {remedy}")
     if not mesh or output is None:
         missing = "--output" if mesh else "MESH"
         raise InputError(f"{missing} is missing, expected a mesh and an output folder; see flexpara unwrap --help")

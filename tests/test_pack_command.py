@@ -83,6 +83,13 @@ def test_several_meshes_share_a_page_and_its_textures(house: Path, tmp_path: Pat
     assert color_at(picture, made.uv[made.faces[2]].mean(axis=0)) == list(BLUE)
 
 
+def test_what_a_format_cannot_hold_is_in_the_report(tmp_path: Path) -> None:
+    (tmp_path / "plate.ply").write_text(PLATE, encoding="utf-8")
+    assert packed(tmp_path / "plate.ply", out=tmp_path / "out", words=("--format", "glb")) == 0
+    report = json.loads((tmp_path / "out" / "plate.report.json").read_text(encoding="utf-8"))
+    assert report["changes"] == {"polygons_as_triangles": 1}
+
+
 def test_the_api_packs_and_saves(house: Path, tmp_path: Path) -> None:
     result = flexpara.pack(house, size=64, padding=1)
     assert result.atlas.size == 64

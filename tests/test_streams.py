@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 from pathlib import Path
 
@@ -42,6 +43,15 @@ class Stream:
 def test_a_folder_stands_for_its_meshes(folder: Path, tmp_path: Path) -> None:
     assert main(["unwrap", str(folder), "-o", str(tmp_path / "out"), *QUICK]) == 0
     assert sorted(path.name for path in (tmp_path / "out").glob("*.glb")) == ["a.glb", "b.glb"]
+
+
+@pytest.mark.usefixtures("instant_training")
+def test_files_with_one_texel_density_have_it_all(folder: Path, tmp_path: Path) -> None:
+    argv = ["unwrap", str(folder), "-o", str(tmp_path / "out"), "--size", "128", *QUICK[2:]]
+    assert main([*argv, "--texel-density", "40"]) == 0
+    reports = [json.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "out").glob("*.report.json")]
+    dense = [report["metrics"]["texel_density_mean"] for report in reports]
+    assert dense == pytest.approx([40.0, 40.0], rel=1e-4)
 
 
 @pytest.mark.usefixtures("instant_training")

@@ -23,7 +23,7 @@ from ..highpoly.highmesh import merge_assets
 from ..results.output import BakeJob, stack_notes, texture_notes, with_cut, write_outputs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -75,6 +75,14 @@ class PackResult(Saving[PackOutputs]):
             for atlas, asset, ending in each
         ]
 
+    def with_losses(self, outputs: PackOutputs) -> PackResult:
+        """With what the meshes hold and their outputs do not among the report's changes."""
+        from ...runtime.io.asset.changes import lost
+
+        each = zip(self.assets, self.suffixes, strict=True)
+        changes = [self.report["changes"], *(lost(asset, outputs.for_mesh(asset, ending)) for asset, ending in each)]
+        return replace(self, report={**self.report, "changes": summed(changes)})
+
     def write(
         self,
         output: OutputFolder,
@@ -86,16 +94,16 @@ class PackResult(Saving[PackOutputs]):
         from ...runtime.io.asset.changes import told
         from .pages import write_on_pages, write_on_tiles
 
-        clock, say = Clock.of(progress), note or (lambda _: None)
+        clock, say, told_of = Clock.of(progress), note or (lambda _: None), self.with_losses(outputs)
         if self.page is not None:
             write = write_on_tiles if self.report["settings"]["udim"] else write_on_pages
-            output.write_report({**write(self, output, outputs, clock, say), "seconds": clock.rounded})
+            output.write_report({**write(told_of, output, outputs, clock, say), "seconds": clock.rounded})
             return output.commit()
         whole, pieces = self.jobs(outputs)
         named = [f"{piece.asset.stem}.{kind}" for piece in pieces for kind in piece.outputs.formats]
         check_outputs(output, whole.outputs, whole.maps, meshes=False, more=named)
         apart = self.report["metrics"]["overlap_fraction"] == 0.0
-        report = {**self.report, "outputs": whole.outputs.facts()}
+        report = {**told_of.report, "outputs": whole.outputs.facts()}
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
         cut = told({"polygons_cut": report["polygons_cut"]})
         for fact in (*cut, *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):
@@ -161,12 +169,17 @@ def pack_assets(
     report = {
         "version": __version__,
         "sources": [{"stem": one.stem, "sha256": one.sha256, "faces": len(one.faces)} for one in assets],
-        "changes": {name: sum(one.get(name, 0) for one in changes) for one in changes for name in one if one[name]},
+        "changes": summed(changes),
         "settings": {**asdict(options), "padding": options.margin},
         "pack": packed.report,
         "metrics": {**metrics.to_dict(), **({} if page is None else _of_pages(packed.atlas, int(page.max()) + 1))},
     }
     return PackResult(tuple(assets), tuple(suffixes), whole, packed.atlas, report, page)
+
+
+def summed(changes: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Counts of several meshes as those of all together."""
+    return {name: sum(one.get(name, 0) for one in changes) for one in changes for name in one if one[name]}
 
 
 def _of_pages(atlas: Atlas, count: int) -> dict[str, Any]:

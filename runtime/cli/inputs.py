@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,8 @@ from ..errors import InputError, MissingFileError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from cyclopts import App
 
 STREAM = Path("-")
 """Standard input or output in the place of a path."""
@@ -51,6 +54,13 @@ def from_stdin(folder: Path) -> Path:
     path = folder / f"stdin{ending_of(data)}"
     path.write_bytes(data)
     return path
+
+
+def like_option(word: str, command: App) -> str:
+    """What to do about an option that a command does not have: the nearest it has, or its help."""
+    known = [name for argument in command.assemble_argument_collection() for name in argument.names]
+    close = get_close_matches(word.partition("=")[0], known, 1)
+    return f"did you mean {close[0]}?" if close else f"see {' '.join(('flexpara', *command.name))} --help"
 
 
 def ending_of(data: bytes) -> str:

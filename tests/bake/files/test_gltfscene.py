@@ -194,6 +194,30 @@ def test_a_primitive_without_material_gets_one_without_which_trimesh_passes_over
     assert_valid(path)
 
 
+def test_variants_keep_their_materials_and_their_pictures_on_the_old_uv(source: Path) -> None:
+    scene = scenefile.whole_scene()
+    primitive = scene.tree["meshes"][1]["primitives"][0]
+    primitive["material"] = 1
+    mappings = [{"material": 0, "variants": [0]}, {"material": 1, "variants": [1]}]
+    primitive["extensions"] = {"KHR_materials_variants": {"mappings": mappings}}
+    scene.tree["extensions"]["KHR_materials_variants"] = {"variants": [{"name": "painted"}, {"name": "glass"}]}
+    scene.tree["extensionsUsed"].append("KHR_materials_variants")
+    scene.tree["meshes"][0]["primitives"] = scene.tree["meshes"][0]["primitives"][1:]
+    source.write_bytes(scene.glb())
+    after = tree_of(rewritten(source, ("base-color",)))
+    (arm,) = after["meshes"][1]["primitives"]
+    first, second = arm["extensions"]["KHR_materials_variants"]["mappings"]
+    assert (first["variants"], second["variants"]) == ([0], [1])
+    assert second["material"] == arm["material"]
+    painted, glass = (after["materials"][each["material"]] for each in (first, second))
+    assert (painted["name"], glass["name"]) == ("Paint", "Glass")
+    assert painted["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0, "texCoord": 1}
+    assert after["images"][after["textures"][glass["pbrMetallicRoughness"]["baseColorTexture"]["index"]]["source"]][
+        "name"
+    ].endswith("base-color")
+    assert_valid(source.with_name("result.glb"))
+
+
 def test_tangents_come_with_a_baked_normal_map(source: Path) -> None:
     path = rewritten(source, ("normal",))
     tangents = corners(path, 0, 0, "TANGENT")
