@@ -320,8 +320,7 @@ class UnwrapPages(Unwrapping):
         clock, report = Clock(progress), {**self.report, "outputs": outputs.facts()}
         report["changes"] = {**report["changes"], **lost(self.asset, outputs.for_asset(self.asset))}
         pairs, seed = [(page.asset, page.found.atlas) for page in self.pages], self.reports[0]["settings"]["seed"]
-        several = Several(self.asset, self.tile, pairs, outputs, seed)
-        jobs = several.jobs(output)
+        jobs = (several := Several(self.asset, self.tile, pairs, outputs, seed)).jobs(output)
         for page in self.pages:
             networks = write_networks(output, page.asset, page.found, clock, inverse=outputs.inverse)
             report["pages"][page.asset.stem] = {**page.report, **networks}

@@ -24,7 +24,7 @@ def box_of_quads(rows: int) -> tuple[np.ndarray, list[list[int]]]:
         for side in (-1.0, 1.0):
             for i, j in np.ndindex(rows, rows):
                 ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)][:: int(side)]
-                corner = [np.roll([side, line[a], line[b]], axis) for a, b in ring]
+                corner = [np.roll(np.array([side, line[a], line[b]]), axis) for a, b in ring]
                 quads.append([places.setdefault(tuple(point.tolist()), len(places)) for point in corner])
     return np.array(list(places)), quads
 

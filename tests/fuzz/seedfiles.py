@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import tempfile
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -241,6 +242,29 @@ def gltf_text() -> bytes:
     return files["model.gltf"]
 
 
+def coloured_3mf() -> bytes:
+    """Components of two parts, with colours, a texture and its uv."""
+    head = 'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"'
+    corners = "".join(f'<vertex x="{x}" y="{y}" z="{x * y}"/>' for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    faces = (
+        '<triangle v1="0" v2="1" v3="2" pid="1" p1="0"/><triangle v1="0" v2="2" v3="3" pid="3" p1="0" p2="1" p3="0"/>'
+    )
+    groups = '<colorgroup id="1"><color color="#00FF0080"/></colorgroup><texture2d id="2" path="/a.png"/>'
+    groups += '<texture2dgroup id="3" texid="2"><tex2coord u="0" v="0.5"/><tex2coord u="1" v="1"/></texture2dgroup>'
+    inner = f'{groups}<object id="4"><mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh></object>'
+    pair = '<component path="/b.model" objectid="4" transform="1 0 0 0 2 0 0 0 1 5 0 0"/><component objectid="4"/>'
+    both = f'{inner}<object id="5"><components>{pair}</components></object>'
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr(
+            "3D/3dmodel.model",
+            f'<model {head}><resources>{both}</resources><build><item objectid="5"/></build></model>',
+        )
+        archive.writestr("b.model", f"<model {head}><resources>{inner}</resources></model>")
+        archive.writestr("a.png", picture("PNG"))
+    return stream.getvalue()
+
+
 MADE: dict[str, Callable[[], list[bytes]]] = {
     "obj": lambda: [OBJ.encode(), PLAIN.encode(), *corpus(".obj")],
     "mtl": lambda: [MTL.encode()],
@@ -260,7 +284,7 @@ MADE: dict[str, Callable[[], list[bytes]]] = {
         arrays_file(a=np.eye(3)),
     ],
     "csv": lambda: [table.encode() for table in TABLES],
-    "3mf": lambda: [exported("3mf")],
+    "3mf": lambda: [exported("3mf"), coloured_3mf()],
     "dae": lambda: [exported("dae")],
 }
 

@@ -11,6 +11,7 @@ import io
 import posixpath
 import re
 import zipfile
+import zlib
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
@@ -44,6 +45,8 @@ PREFIX, HEAD = re.compile(rb'xmlns:(\w+)\s*=\s*"([^"]*)"'), 8192
 """Declarations of namespaces, and the bytes of a part that they stand in."""
 COLOR_GROUPS = {"basematerials": ("base", "displaycolor"), "colorgroup": ("color", "color")}
 """Kind of resource → its entries, and their attribute with a colour."""
+BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError)
+"""What an entry of an archive raises that can't be unpacked."""
 WHITE = (255, 255, 255, 255)
 
 
@@ -84,7 +87,9 @@ def read_3mf(data: bytes) -> RawMesh:
         try:
             _read_parts(model, _start(archive))
             placed = list(_placed(model))
-        except (ElementTree.ParseError, ValueError, LookupError, TypeError, OverflowError) as error:
+        except MeshError:
+            raise
+        except (*BROKEN, ElementTree.ParseError, ValueError, LookupError, TypeError, OverflowError) as error:
             found = " ".join(str(error).split())[:80]
             raise MeshError(f"the 3MF file is damaged ({found}), expected its objects; export it again") from error
     if not placed:
