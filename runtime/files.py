@@ -28,6 +28,8 @@ STAGING = ".flexpara-"
 """Beginning of the names of hidden folders."""
 LARGEST_REPORT = 64 << 20
 """Bytes beyond which a JSON file is no report."""
+LONGEST = 220
+"""Bytes of a stem: names of files have 255 on most disks, and those of results are longer than it."""
 JOURNAL = ".flexpara.json"
 """Ending of the name of a hidden file that lists what is being moved."""
 
@@ -64,11 +66,14 @@ class OutputFolder:
             report: another name for the report (must be `<stem>.<something>.json`).
 
         Raises:
-            InputError: the folder is a file, or a name is no plain file name.
+            InputError: the folder is a file, or a name is too long or no plain file name.
         """
         self.folder, self.stem, self.force, self.source = folder, stem, force, source
         self.report_name = report or f"{stem}.report.json"
         _plain(self.report_name)
+        if len(os.fsencode(stem)) > LONGEST:
+            found = f"{stem[:20]}… has a name of {len(os.fsencode(stem))} bytes"
+            raise InputError(f"{found}, expected at most {LONGEST}, as names of results are longer; rename the input")
         for part in (folder, *folder.parents):
             if part.exists() and not part.is_dir():
                 raise InputError(f"{part} is a file, expected a folder for the output; choose another -o")

@@ -86,7 +86,8 @@ def work_off(
     def left() -> list[Job]:
         entries = all_entries(output, manifest)
         found = left_to_do(jobs, entries, __version__, retry=batch.retry_failed)
-        console.note(f"{len(found)} of {len(jobs)} assets are left to do")
+        share = f" of shard {batch.shard}" if batch.mark else ""
+        console.note(f"{len(found)} of {len(jobs)} assets{share} are left to do")
         again = {job.name for job in found}
         given_up = sum(entries[job.name].status == "failed" for job in jobs if job.name not in again)
         if given_up:

@@ -72,7 +72,7 @@ def answer(function: Callable[[Run], object], run: Run) -> dict[str, Any]:
         function(run)
         facts: dict[str, Any] = {"status": "done", **outcome(run.output)}
     except FlexparaError as error:
-        said = " ".join(str(error).split())
+        said = " ".join(str(error).split()).removeprefix(f"{run.mesh}: ")  # the entry names it
         facts = {"status": "failed", "error": said, "again": isinstance(error, DiskFullError)}
     except MemoryError:
         facts = {"status": "failed", "error": "out of memory, expected less to be enough; give it a machine with more"}

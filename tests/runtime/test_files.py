@@ -194,6 +194,12 @@ def test_a_folder_in_the_place_of_a_file_is_refused(tmp_path: Path) -> None:
         output.check(["bunny.glb"])
 
 
+def test_a_name_that_leaves_no_room_for_those_of_results_is_refused(tmp_path: Path) -> None:
+    OutputFolder(tmp_path, "ü" * 110)
+    with pytest.raises(InputError, match=r"has a name of 222 bytes, expected at most 220, .*; rename the input"):
+        OutputFolder(tmp_path, "ü" * 111)
+
+
 @pytest.mark.parametrize("name", ["", ".hidden", "a/b", "..", "a\nb", "a\\b"])
 def test_only_plain_names_are_written(tmp_path: Path, name: str) -> None:
     with OutputFolder(tmp_path, "bunny") as output, pytest.raises(InputError, match="plain file name"):
