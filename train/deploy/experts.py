@@ -5,11 +5,12 @@ n samples · d inputs · m outputs · k nodes.   float64.  Samples come node by 
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .sums import node_sums
+from .sums import as_matrices, node_sums, products, squares, twice
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class Lesson(NamedTuple):
 
     def among(self, rows: NDArray[np.int64]) -> Lesson:
         """Those samples, in that order."""
-        return Lesson(self.x[rows], self.y[rows], self.label[rows], self.slope[rows], self.plane[rows])
+        return Lesson(*(np.take(part, rows, axis=0) for part in self))  # a quarter of the time of part[rows]
 
 
 class Fitted(NamedTuple):
@@ -44,16 +45,23 @@ class Fitted(NamedTuple):
 def fit_affine(lesson: Lesson, first: NDArray[np.int64], ridge: float) -> Fitted:
     """Ridge regressions of y on x, one a node; ``lesson`` comes node by node, first (k,): where each begins."""
     count = np.diff(first, append=len(lesson.x))
-    owner = np.repeat(np.arange(len(first)), count)
     mean_x, mean_y = (node_sums(part, first) / count[:, None] for part in (lesson.x, lesson.y))
-    x, y = lesson.x - mean_x[owner], lesson.y - mean_y[owner]
-    gram = node_sums(x[:, :, None] * x[:, None, :], first)
-    cross = node_sums(x[:, :, None] * y[:, None, :], first)
+    x, y = lesson.x - np.repeat(mean_x, count, axis=0), lesson.y - np.repeat(mean_y, count, axis=0)
+    d, m = x.shape[1], y.shape[1]
+    gram = as_matrices(node_sums(products(x, x, twice(d)), first), d)
+    cross = node_sums(products(x, y, list(np.ndindex(d, m))), first).reshape(-1, d, m)
     prior = node_sums(lesson.slope, first) / count[:, None, None]
     pull = ridge * np.trace(gram, axis1=1, axis2=2) / x.shape[1] + np.finfo(np.float64).tiny
     pull = pull[:, None, None]
     slope = np.linalg.solve(gram + pull * np.eye(x.shape[1]), cross + pull * prior.transpose(0, 2, 1))
     return Fitted(mean_x, mean_y, slope.transpose(0, 2, 1))
+
+
+def misses(own: Lesson, first: NDArray[np.int64], fitted: Fitted) -> NDArray[np.float64]:
+    """(n, m) by how much the map of its node misses each sample."""
+    count = np.diff(first, append=len(own.x))
+    slope, mean_x, mean_y = (np.repeat(part, count, axis=0) for part in (fitted.slope, fitted.mean_x, fitted.mean_y))
+    return own.y - mean_y - np.einsum("nmd,nd->nm", slope, own.x - mean_x)
 
 
 def untorn(own: Lesson, first: NDArray[np.int64], fitted: Fitted, limit: float, steepest: float) -> Fitted:
@@ -63,11 +71,10 @@ def untorn(own: Lesson, first: NDArray[np.int64], fitted: Fitted, limit: float, 
     shows by a map that is ``steepest`` times as steep as the surface is anywhere.
     """
     count = np.diff(first, append=len(own.x))
-    owner = np.repeat(np.arange(len(first)), count)
-    ahead = np.einsum("nmd,nd->nm", fitted.slope[owner], own.x - fitted.mean_x[owner])
-    off = ((own.y - fitted.mean_y[owner] - ahead) ** 2).sum(axis=1)
+    off = squares(misses(own, first, fitted))
     mean_x, mean_y, slope = (part.copy() for part in fitted)
-    steep = np.maximum.reduceat(np.abs(own.slope).max(axis=(1, 2)), first)
+    steepness = reduce(np.maximum, np.abs(own.slope).reshape(len(own.x), -1).T)
+    steep = np.maximum.reduceat(steepness, first)
     torn = (np.abs(slope).max(axis=(1, 2)) > steepest * steep) & (steep > 0.0)
     for node in np.flatnonzero((np.add.reduceat(off, first) > limit**2 * count) | torn):
         rows = slice(first[node], first[node] + count[node])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .sums import node_sums
+from .sums import as_matrices, node_sums, products, twice
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,14 +36,18 @@ class Spread(NamedTuple):
     first: NDArray[np.int64]
     mean: NDArray[np.float64]
 
-    @property
-    def owner(self) -> NDArray[np.int64]:
-        """(n,) the node of each row."""
-        return np.repeat(np.arange(len(self.first)), np.diff(self.first, append=len(self.x)))
+    def each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, …) for each row the value (k, …) of its node."""
+        return np.repeat(values, np.diff(self.first, append=len(self.x)), axis=0)
 
     def total(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums over the rows of each node, (k, …)."""
         return node_sums(part, self.first)
+
+    def gram(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, d, d) sums of part partᵀ over the rows (n, d) of each node."""
+        d = part.shape[1]
+        return as_matrices(self.total(products(part, part, twice(d))), d)
 
 
 class Chosen(NamedTuple):
@@ -61,7 +65,7 @@ class Chosen(NamedTuple):
 
 def principal_gates(spread: Spread) -> NDArray[np.float64]:
     """(k, d + 1) across the direction in which the samples extend most, through their mean."""
-    return _through_mean(_first_axis(spread.total(spread.x[:, :, None] * spread.x[:, None, :])), spread)
+    return _through_mean(_first_axis(spread.gram(spread.x)), spread)
 
 
 def fisher_gates(spread: Spread) -> NDArray[np.float64]:
@@ -70,14 +74,14 @@ def fisher_gates(spread: Spread) -> NDArray[np.float64]:
     Above and below: along the direction in which outputs vary most.  Outputs of two charts, or of the two sides of a
     slit, lie far apart: the gate is then the plane between two sheets, or one along the seam.
     """
-    axis = _first_axis(spread.total(spread.y[:, :, None] * spread.y[:, None, :]))
-    above = np.einsum("nm,nm->n", spread.y, axis[spread.owner]) > 0.0
+    axis = _first_axis(spread.gram(spread.y))
+    above = np.einsum("nm,nm->n", spread.y, spread.each(axis)) > 0.0
     means = []
     for side in (above, ~above):
         count = np.maximum(spread.total(side.astype(np.float64)), 1.0)
         means.append(spread.total(spread.x * side[:, None]) / count[:, None])
-    rest = spread.x - np.where(above[:, None], means[0][spread.owner], means[1][spread.owner])
-    within = spread.total(rest[:, :, None] * rest[:, None, :])
+    rest = spread.x - np.where(above[:, None], spread.each(means[0]), spread.each(means[1]))
+    within = spread.gram(rest)
     dims = spread.x.shape[1]
     floor = 1e-9 * spread.total(np.einsum("nd,nd->n", spread.x, spread.x)) + TINY
     normal = np.linalg.solve(within + floor[:, None, None] * np.eye(dims), (means[0] - means[1])[:, :, None])[:, :, 0]
@@ -106,11 +110,12 @@ def best_gates(spread: Spread, picks: int, ridge: float, rng: np.random.Generato
     total = spread.total(features)
     pull = ridge * spread.total(np.einsum("nd,nd->n", spread.x, spread.x)) + TINY
     before = _squared_error(total, spread, pull)
+    places = spread.x + spread.each(spread.mean)
     made = [principal_gates(spread), fisher_gates(spread)]
     best = Chosen(np.zeros_like(made[0]), np.full(len(before), np.inf), before, np.zeros(len(before), dtype=bool))
     for i, exact in enumerate((*made, *known_gates(spread, picks, rng))):
         plane = exact.astype(np.float32).astype(np.float64)
-        left = _error_left(plane, features, total, spread, pull)
+        left = _error_left(plane, places, features, (total, pull), spread)
         better = left < best.left
         best = Chosen(
             np.where(better[:, None], plane, best.plane),
@@ -128,18 +133,21 @@ def second_side(plane: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[n
 
 def _error_left(
     plane: NDArray[np.float64],
+    places: NDArray[np.float64],
     features: NDArray[np.float64],
-    total: NDArray[np.float64],
+    whole: tuple[NDArray[np.float64], NDArray[np.float64]],
     spread: Spread,
-    pull: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(k,) squared error behind gates (k, d + 1); inf where a side is empty or the gate is NaN."""
+    """(k,) squared error behind gates (k, d + 1); inf where a side is empty or the gate is NaN.
+
+    places: (n, d) the samples.  features: of each.  whole: sums of them over each node, and its ridge.
+    """
+    total, pull = whole
     known = np.flatnonzero(np.isfinite(plane[:, 0]))
     left = np.full(len(plane), np.inf)
     if len(known) == 0:
         return left
-    owner = spread.owner
-    second = second_side(plane[owner], spread.x + spread.mean[owner])
+    second = second_side(spread.each(plane), places)
     sums = node_sums(features, spread.first, np.flatnonzero(second))[known]
     rest = total[known] - sums
     error = _squared_error(sums, spread, pull[known]) + _squared_error(rest, spread, pull[known])
@@ -148,19 +156,23 @@ def _error_left(
 
 
 def _features(spread: Spread) -> NDArray[np.float64]:
-    """(n, ·) what the squared error of an affine map is made of: 1, x, y, y · y, x xᵀ, x yᵀ; sums add up."""
-    x, y = spread.x, spread.y
-    parts = (np.ones((len(x), 1)), x, y, np.einsum("nm,nm->n", y, y)[:, None])
-    products = ((x[:, :, None] * other[:, None, :]).reshape(len(x), -1) for other in (x, y))
-    return np.concatenate([*parts, *products], axis=1)
+    """(n, ·) what the squared error of an affine map is made of: 1, x, y, y · y, x yᵀ, x xᵀ; sums add up."""
+    x, y, (d, m) = spread.x, spread.y, (spread.x.shape[1], spread.y.shape[1])
+    crossed, doubled = list(np.ndindex(d, m)), twice(d)
+    found = np.ones((len(x), 2 + d + m + len(crossed) + len(doubled)))
+    _, here, there, square, cross, gram = np.split(found, np.cumsum([1, d, m, 1, len(crossed)]), axis=1)
+    here[:], there[:], square[:, 0] = x, y, np.einsum("nm,nm->n", y, y)
+    products(x, y, crossed, cross)
+    products(x, x, doubled, gram)
+    return found
 
 
 def _squared_error(sums: NDArray[np.float64], spread: Spread, pull: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) squared error of the best affine map with ridges ``pull`` (k,), from sums (k, ·) of features."""
     d, m = spread.x.shape[1], spread.y.shape[1]
-    count, x, y, square, gram, cross = np.split(sums, np.cumsum([1, d, m, 1, d * d]), axis=1)
+    count, x, y, square, cross, gram = np.split(sums, np.cumsum([1, d, m, 1, d * m]), axis=1)
     count = np.maximum(count, 1.0)
-    gram = gram.reshape(-1, d, d) - x[:, :, None] * x[:, None, :] / count[:, :, None]
+    gram = as_matrices(gram, d) - x[:, :, None] * x[:, None, :] / count[:, :, None]
     cross = cross.reshape(-1, d, m) - x[:, :, None] * y[:, None, :] / count[:, :, None]
     slope = np.linalg.solve(gram + pull[:, None, None] * np.eye(d), cross)
     error = square[:, 0] - np.einsum("km,km->k", y, y) / count[:, 0] - np.einsum("kdm,kdm->k", slope, cross)

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from .experts import Lesson, fit_affine, untorn
+from .experts import Lesson, fit_affine, misses, untorn
 from .gated import GatedExperts, Grid
 from .gates import Chosen, Spread, best_gates, second_side
-from .sums import node_sums
+from .sums import node_sums, squares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,16 +92,17 @@ def grow_on(grid: Grid, lesson: Lesson, config: GrowConfig, tolerance: float, rn
     slot, first = np.unique(cells[order], return_index=True)
     nodes, decided = Nodes(order, first, slot), Decided(grid, slot, np.zeros(grid.count, dtype=np.int64))
     apart = _apart(lesson, config.apart)
+    own = apart.among(nodes.rows)
     while len(nodes.first):
-        done = _is_done(apart, nodes, config, tolerance, decided) | (decided.depth >= config.deepest)
-        nodes = _halve(apart, nodes, done, config, decided, rng)
+        done = _is_done(own, nodes, config, tolerance, decided) | (decided.depth >= config.deepest)
+        nodes, own = _halve(own, nodes, done, config, decided, rng)
         decided.depth += len(nodes.first) > 0
     return _assembled(lesson, decided, config, tolerance)
 
 
 def lay_grid(x: NDArray[np.float64], most: int, longest: int) -> Grid:
     """Nearly cubic cells over the samples: as small as ``most`` cells, and ``longest`` along an axis, allow."""
-    low, high = x.min(axis=0), x.max(axis=0)
+    low, high = (np.array([side(column) for column in x.T]) for side in (np.min, np.max))
     extent = np.maximum(high - low, 1e-9 * max(float((high - low).max()), 1e-9))
     sides = float(extent.max()) / np.arange(longest, 0, -1)
     shapes = np.ceil(extent / sides[:, None]).clip(min=1.0)
@@ -123,18 +124,18 @@ def _filled_grid(x: NDArray[np.float64], cells: int, config: GrowConfig) -> Grid
 
 def _apart(lesson: Lesson, multiple: float) -> Lesson:
     """The outputs of each label moved far away from those of all others, so that one error speaks for both."""
-    extent = max(float(np.ptp(lesson.y, axis=0).max()), 1e-9)
+    extent = max(*(float(np.ptp(column)) for column in lesson.y.T), 1e-9)
     labels = int(lesson.label.max()) + 1
     away = np.random.default_rng(0).uniform(-1.0, 1.0, size=(labels, lesson.y.shape[1])) * multiple * extent
     return lesson._replace(y=lesson.y + away[lesson.label])
 
 
-def _is_done(lesson: Lesson, nodes: Nodes, config: GrowConfig, tolerance: float, decided: Decided) -> NDArray[np.bool_]:
-    """(k,) True for nodes that are to be experts: of one label, and good or small enough; or beyond the budget."""
-    own = lesson.among(nodes.rows)
-    fitted, owner = fit_affine(own, nodes.first, config.ridge), nodes.owner
-    ahead = np.einsum("nmd,nd->nm", fitted.slope[owner], own.x - fitted.mean_x[owner])
-    off = np.linalg.norm(own.y - fitted.mean_y[owner] - ahead, axis=1)
+def _is_done(own: Lesson, nodes: Nodes, config: GrowConfig, tolerance: float, decided: Decided) -> NDArray[np.bool_]:
+    """(k,) True for nodes that are to be experts: of one label, and good or small enough; or beyond the budget.
+
+    own: the samples of the level, node by node.
+    """
+    off = np.sqrt(squares(misses(own, nodes.first, fit_affine(own, nodes.first, config.ridge))))
     worst = np.maximum.reduceat(off, nodes.first)
     low, high = (reduce.reduceat(own.label, nodes.first) for reduce in (np.minimum, np.maximum))
     done = (low == high) & ((worst <= tolerance) | (nodes.sizes <= config.fewest))
@@ -146,22 +147,23 @@ def _is_done(lesson: Lesson, nodes: Nodes, config: GrowConfig, tolerance: float,
 
 
 def _halve(
-    lesson: Lesson,
+    own: Lesson,
     nodes: Nodes,
     done: NDArray[np.bool_],
     config: GrowConfig,
     decided: Decided,
     rng: np.random.Generator,
-) -> Nodes:
-    """Write down what is settled on this level, and halve the other nodes into those of the next."""
-    plane = np.full((len(done), lesson.x.shape[1] + 1), np.nan)
+) -> tuple[Nodes, Lesson]:
+    """Write down what is settled on this level, and halve the other nodes into those of the next.
+
+    own: the samples of the level, node by node, as those of the next come back with it: near each other in memory.
+    """
+    plane = np.full((len(done), own.x.shape[1] + 1), np.nan)
     if not done.all():
-        kept = nodes.rows[~done[nodes.owner]]
         count = nodes.sizes[~done]
-        own, first = lesson.among(kept), np.cumsum(count) - count
-        spread = _spread(own, first)
-        chosen = best_gates(spread, config.known, config.gate_ridge, rng)
-        useful = _is_useful(chosen, count, _labels(own.label, first), config)
+        kept, first = own.among(np.flatnonzero(~done[nodes.owner])), np.cumsum(count) - count
+        chosen = best_gates(_spread(kept, first), config.known, config.gate_ridge, rng)
+        useful = _is_useful(chosen, count, _labels(kept.label, first), config)
         plane[np.flatnonzero(~done)[useful]] = chosen.plane[useful]
     gated = np.isfinite(plane[:, 0])
     _settle(nodes, gated, decided)
@@ -171,10 +173,12 @@ def _halve(
     decided.gate_count += len(gate)
     slots = len(decided.codes) + np.arange(2 * len(gate))
     decided.codes = np.concatenate([decided.codes, np.zeros(2 * len(gate), dtype=np.int64)])
-    rows, owner = nodes.rows[gated[nodes.owner]], np.repeat(np.arange(len(gate)), nodes.sizes[gated])
-    side = 2 * owner + second_side(plane[gated][owner], lesson.x[rows])
+    place, owner = np.flatnonzero(gated[nodes.owner]), np.repeat(np.arange(len(gate)), nodes.sizes[gated])
+    side = 2 * owner + second_side(np.take(plane[gated], owner, axis=0), np.take(own.x, place, axis=0))
     order = np.argsort(side, kind="stable")
-    return Nodes(rows[order], np.searchsorted(side[order], np.arange(2 * len(gate))), slots)
+    place = place[order]
+    following = Nodes(nodes.rows[place], np.searchsorted(side[order], np.arange(2 * len(gate))), slots)
+    return following, own.among(place)
 
 
 def _is_useful(
@@ -206,8 +210,8 @@ def _spread(own: Lesson, first: NDArray[np.int64]) -> Spread:
     """The samples of nodes about their means."""
     count = np.diff(first, append=len(own.x))
     mean_x, mean_y = (node_sums(part, first) / count[:, None] for part in (own.x, own.y))
-    owner = np.repeat(np.arange(len(first)), count)
-    return Spread(own.x - mean_x[owner], own.y - mean_y[owner], own.plane, first, mean_x)
+    x, y = own.x - np.repeat(mean_x, count, axis=0), own.y - np.repeat(mean_y, count, axis=0)
+    return Spread(x, y, own.plane, first, mean_x)
 
 
 def _settle(nodes: Nodes, gated: NDArray[np.bool_], decided: Decided) -> None:
