@@ -41,5 +41,6 @@ def samples_in_faces(surface: Surface, face: NDArray[np.int64], rng: np.random.G
     """One uniform point in each of the faces named, (n,) int64."""
     root, v = np.sqrt(rng.random(len(face))), rng.random(len(face))
     barycentric = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
-    xyz = np.einsum("nc,ncd->nd", barycentric, surface.triangles[face])
-    return Samples(xyz=xyz, face=face, barycentric=barycentric, normal=surface.face_normals()[face])
+    xyz = np.einsum("nc,ncd->nd", barycentric, np.take(surface.triangles, face, axis=0))
+    normal = np.take(surface.face_normals(), face, axis=0)
+    return Samples(xyz=xyz, face=face, barycentric=barycentric, normal=normal)

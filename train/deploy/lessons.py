@@ -44,12 +44,14 @@ class Seams(NamedTuple):
 def lesson_of(surface: Surface, charts: Charts, config: SampleConfig, rng: np.random.Generator) -> Lesson:
     """Uv and chart at samples of a surface in the unit ball."""
     face, barycentric, plane = spots_on(surface, charts, config, rng)
-    corners, uv = surface.vertices[surface.faces[face]], charts.corner_uv[face]
+    triangles = surface.triangles
+    corners, uv = np.take(triangles, face, axis=0), np.take(charts.corner_uv, face, axis=0)
+    once = len(triangles) <= len(face)  # the slope of each face, or of each sample's
     return Lesson(
         x=np.einsum("nc,ncd->nd", barycentric, corners),
         y=np.einsum("nc,ncd->nd", barycentric, uv),
         label=charts.face_chart[face],
-        slope=face_slopes(corners, uv),
+        slope=np.take(face_slopes(triangles, charts.corner_uv), face, axis=0) if once else face_slopes(corners, uv),
         plane=plane,
     )
 
