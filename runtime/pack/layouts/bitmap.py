@@ -153,10 +153,13 @@ def nest(charts: list[list[Mask]], order: NDArray[np.int64], columns: int, *, mo
         # on top of all others there is room: nothing above what would lie there matters
         below = (1 << (size[1] + extents[chart] + 1) * stride) - 1
         spread = _spreads(taken & below, max((mask.width for _, mask in fitting), default=1))
-        tops = [(_lowest(spread, mask, stride), number) for number, mask in fitting]
-        best = min(
-            ((row + charts[chart][number].height, row, column, number) for (row, column), number in tops), default=None
-        )
+        best: tuple[int, int, int, int] | None = None
+        for number, mask in fitting:
+            rows = size[1] + 1 if best is None else best[0] - mask.height + 1
+            place_of = _lowest(spread, mask, stride, rows) if rows > 0 else None
+            if place_of is not None:
+                found = (place_of[0] + mask.height, *place_of, number)
+                best = found if best is None else min(best, found)
         if best is None or best[0] > most:
             return None
         top, row, column, number = best
@@ -175,13 +178,17 @@ def _spreads(taken: int, widest: int) -> list[int]:
     return found
 
 
-def _lowest(spread: list[int], mask: Mask, stride: int) -> tuple[int, int]:
-    """Row and column of the lowest place, the leftmost of them, where no cell of the mask is taken."""
-    blocked = 0
+def _lowest(spread: list[int], mask: Mask, stride: int, rows: int) -> tuple[int, int] | None:
+    """Row and column of the lowest place, the leftmost of them, where no cell of the mask is taken.
+
+    rows: how many may be its first; None where it has no place there.  Nothing above what it covers is looked at.
+    """
+    window = (1 << (rows + mask.height) * stride) - 1
+    spread, blocked = [each & window for each in spread], 0
     for row, first, length in mask.runs:
         power, start = length.bit_length() - 1, row * stride + first
         blocked |= spread[power] >> start
         if length != 1 << power:
             blocked |= spread[power] >> (start + length - (1 << power))
-    free = ~blocked
-    return divmod((free & -free).bit_length() - 1, stride)
+    free = ~blocked & ((1 << rows * stride) - 1)
+    return divmod((free & -free).bit_length() - 1, stride) if free else None
