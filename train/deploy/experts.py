@@ -31,7 +31,8 @@ class Lesson(NamedTuple):
 
     def among(self, rows: NDArray[np.int64]) -> Lesson:
         """Those samples, in that order."""
-        return Lesson(*(np.take(part, rows, axis=0) for part in self))  # a quarter of the time of part[rows]
+        x, y, slope, plane = (np.take(part, rows, axis=0) for part in (self.x, self.y, self.slope, self.plane))
+        return Lesson(x, y, np.take(self.label, rows), slope, plane)  # a quarter of the time of x[rows]
 
 
 class Fitted(NamedTuple):

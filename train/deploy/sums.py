@@ -32,7 +32,7 @@ def node_sums(
 
 def twice(d: int) -> list[tuple[int, int]]:
     """Pairs of components of x (d,) whose products make up x xᵀ, each product once."""
-    return list(zip(*np.triu_indices(d), strict=True))
+    return [(i, j) for i in range(d) for j in range(i, d)]
 
 
 def products(
