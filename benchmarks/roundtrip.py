@@ -60,10 +60,12 @@ def seen_by_blender(python: Path, path: Path, folder: Path, export: Path | None 
 
 
 def has_normals(path: Path) -> bool:
-    """Whether the file itself holds normals, as it is read without any being made."""
-    from flexpara.runtime.io.meshfile import load_asset
+    """Whether the file itself holds normals of faces, as it is read without any being made."""
+    from flexpara.runtime.io.anyfile import load_any
+    from flexpara.runtime.mesh import Asset
 
-    return load_asset(path).normals is not None
+    found = load_any(path, ())
+    return isinstance(found, Asset) and found.normals is not None
 
 
 def held(seen: dict[str, Any]) -> str:

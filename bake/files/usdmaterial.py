@@ -6,6 +6,7 @@ the specification of UsdPreviewSurface asks.
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -63,6 +64,11 @@ def distinct(names: Iterable[str]) -> list[str]:
     return list(found)
 
 
+def called(name: str, identifier: str) -> list[str]:
+    """The metadatum that keeps a name which is no identifier."""
+    return [] if name == identifier else [f"displayName = {json.dumps(name, ensure_ascii=False)}"]
+
+
 def material_text(base: str, source: Material | None, shown: Shown) -> str:
     """The material at the path base: a preview surface, a reader of st, and one texture reader a file.
 
@@ -70,7 +76,9 @@ def material_text(base: str, source: Material | None, shown: Shown) -> str:
     """
     inputs, readers = _connected(base, source, shown)
     surface = "\n".join(f"            {line}" for line in inputs.values())
-    return f"""    def Material "{base.rpartition("/")[2]}"
+    name = base.rpartition("/")[2]
+    named = "".join(f" (\n        {line}\n    )" for line in called(source.name, name)) if source is not None else ""
+    return f"""    def Material "{name}"{named}
     {{
         token outputs:surface.connect = <{base}/surface.outputs:surface>
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...runtime.io.gltf.instances import standing
 from ...runtime.io.gltf.nodes import local_matrix, scene_roots
-from .usdmaterial import distinct
+from .usdmaterial import called, distinct
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,19 +60,31 @@ class Tree:
         """Lines at a depth below the root."""
         self.lines += [f"{'    ' * min(depth, DEEPEST)}{line}" for line in lines]
 
+    def begin(self, depth: int, kind: str, name: str, *metadata: str) -> None:
+        """The beginning of a prim, up to its brace."""
+        self.add(depth, f'def {kind} "{name}"{" (" if metadata else ""}')
+        if metadata:
+            self.add(depth, *(f"    {line}" for line in metadata), ")")
+        self.add(depth, "{")
+
     def mesh(self, depth: int, name: str, prim: Prim, matrix: NDArray[np.float64]) -> None:
         """A Mesh at a place, as seen from its parent."""
-        self.add(depth, f'def Mesh "{name}" (', '    prepend apiSchemas = ["MaterialBindingAPI"]', ")", "{")
+        schemas = 'prepend apiSchemas = ["MaterialBindingAPI"]'
+        self.begin(depth, "Mesh", name, schemas, *called(prim.shape.name, name))
         self.add(depth + 1, *prim.lines, *placed(matrix))
         self.add(depth, "}")
         self.written.append(prim.shape)
 
     def inherited(self, depth: int, name: str, source: str, matrix: NDArray[np.float64]) -> None:
         """A place of a prototype."""
-        self.add(depth, f'def Xform "{name}" (', "    instanceable = true", f"    prepend inherits = <{source}>", ")")
-        self.add(depth, "{")
+        self.begin(depth, "Xform", name, "instanceable = true", f"prepend inherits = <{source}>")
         self.add(depth + 1, *placed(matrix))
         self.add(depth, "}")
+
+
+def node_name(nodes: Sequence[dict[str, Any]], number: int) -> str:
+    """The name of a node of the scene, one made of its number where it has none."""
+    return str(nodes[number].get("name", f"node_{number}"))
 
 
 def placed(matrix: NDArray[np.float64]) -> list[str]:
@@ -105,7 +117,7 @@ def scene_tree(root: str, prims: Sequence[Prim], document: Document) -> Tree:
     if several:
         tree.add(1, f'class Scope "{PROTOTYPES}"', "{")
         for mesh, name in names.items():
-            tree.add(2, f'def Xform "{name}"', "{")
+            tree.begin(2, "Xform", name)
             tree.mesh(3, name, own[mesh], np.eye(4))
             tree.add(2, "}")
         tree.add(1, "}")
@@ -120,7 +132,7 @@ def scene_tree(root: str, prims: Sequence[Prim], document: Document) -> Tree:
             continue
         local = local_matrix(nodes[turn.node])
         world = turn.parent @ local
-        tree.add(turn.depth, f'def Xform "{turn.name}"', "{")
+        tree.begin(turn.depth, "Xform", turn.name, *called(node_name(nodes, turn.node), turn.name))
         tree.add(turn.depth + 1, *placed(local))
         places = at_node.get(turn.node, [])
         below = distinct(own[place.mesh].shape.name for place in places)
@@ -144,7 +156,7 @@ def _push(
     taken: Sequence[str],
 ) -> None:
     """Let nodes wait for their turn, the first on top.  taken: names that siblings have."""
-    names = distinct([*taken, *(str(nodes[number].get("name", f"node_{number}")) for number in numbers)])
+    names = distinct([*taken, *(node_name(nodes, number) for number in numbers)])
     own = zip(numbers, names[len(taken) :], strict=True)
     waiting += reversed([Waiting(number, name, parent, depth) for number, name in own])
 

@@ -71,7 +71,7 @@ class ObjText:
         if not kind:
             return np.zeros(len(self.line), np.int64), [""]
         named = {number: line for number, line in self.statements.items() if keyword(line) == kind}
-        names = ["", *("_".join(line.split()[1:]) for line in named.values())]
+        names = ["", *(" ".join(line.split()[1:]) for line in named.values())]
         place = {name: number for number, name in enumerate(dict.fromkeys(names))}
         at = np.searchsorted(np.array(list(named)), self.line)
         return np.array([place[name] for name in names], dtype=np.int64)[at], list(place)

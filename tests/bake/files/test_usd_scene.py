@@ -158,6 +158,19 @@ def test_objects_of_an_obj_file_are_meshes_and_its_polygons_stay(tmp_path: Path)
     stage, geometry = pxr("Usd").Stage.Open(str(path.with_suffix(".usda"))), pxr("UsdGeom")
     counts = {prim.GetName(): list(geometry.Mesh(prim).GetFaceVertexCountsAttr().Get()) for prim in meshes_of(stage)}
     assert counts == {"Lower_part": [4], "_2": [3]}
+    assert [prim.GetDisplayName() for prim in meshes_of(stage)] == ["Lower part", "2"]
+
+
+def test_names_that_are_no_identifiers_are_kept_beside_them(scene: Path) -> None:
+    made = _helper("scenefile").whole_scene()
+    made.tree["nodes"][1]["name"] = 'Würfel "2"\n'
+    made.tree["materials"][0]["name"] = "Öl"
+    scene.write_bytes(made.glb())
+    _, _, stage = staged(scene)
+    assert [child.GetName() for child in stage.GetPrimAtPath("/scene/Root").GetChildren()] == ["W_rfel__2__", "B", "C"]
+    assert stage.GetPrimAtPath("/scene/Root/W_rfel__2__").GetDisplayName() == 'Würfel "2"\n'
+    assert stage.GetPrimAtPath("/scene/Root/B").GetDisplayName() == ""
+    assert stage.GetPrimAtPath("/scene/Materials/_l").GetDisplayName() == "Öl"
 
 
 def test_vertex_colours_are_display_colours_in_linear_light(tmp_path: Path) -> None:
