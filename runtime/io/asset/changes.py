@@ -51,6 +51,7 @@ WORDS = {
     "skipped_animations": "{} left out|animation|animations",
     "skipped_attributes": "{} of vertices left out, which only glTF holds|attribute|attributes",
     "skipped_cameras": "{} left out|camera|cameras",
+    "skipped_curves": "{} left out|curve or free-form surface|curves or free-form surfaces",
     "skipped_elements": "{} of other kinds than vertex and face left out|table|tables",
     "skipped_extensions": "{} of glTF left out|extension|extensions",
     "skipped_extras": "extras of {} left out|object|objects",

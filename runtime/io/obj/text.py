@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NAMING = ("o", "g", "s")
-ELEMENTS = ("l", "p")
+CURVED = ("curv", "curv2", "surf")
+"""Keywords of what is given by formulas."""
 PICTURES = {"base-color": "map_Kd", "emissive": "map_Ke", "normal": "norm"}
 """Map → keyword of its line in a material library."""
 TEXTURES = ("map_", "bump", "norm", "disp", "decal", "refl")
@@ -86,6 +87,7 @@ class ObjText:
             "skipped_names": sum(self.beyond[kind] for kind in NAMING if kind != kept),
             "skipped_lines": self.beyond["l"],
             "skipped_points": self.beyond["p"],
+            "skipped_curves": sum(self.beyond[kind] for kind in CURVED),
         }
         return {name: count for name, count in counts.items() if count}
 

@@ -76,7 +76,7 @@ def test_a_primitive_that_gets_a_material_is_counted_and_not_complained_of(tmp_p
 
 def test_objects_that_usd_has_as_meshes_are_not_lost_and_groups_are(tmp_path: Path) -> None:
     path = tmp_path / "named.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\no part\ng side\ns 1\nf 1 2 3\nl 1 2\n", encoding="utf-8")
-    asset = load_asset(path)
-    assert losses(asset, "glb") == {"skipped_names": 3, "skipped_lines": 1}
-    assert losses(asset, "usda") == {"skipped_names": 2, "skipped_lines": 1}
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\no part\ng side\ns 1\nf 1 2 3\nl 1 2\ncurv 0 1 1 2\n", encoding="utf-8")
+    asset, left = load_asset(path), {"skipped_lines": 1, "skipped_curves": 1}
+    assert losses(asset, "glb") == {"skipped_names": 3, **left}
+    assert losses(asset, "usda") == {"skipped_names": 2, **left}
