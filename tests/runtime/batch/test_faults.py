@@ -30,6 +30,30 @@ def test_each_asset_has_the_bytes_of_a_single_run(
     assert alone == {name: value for name, value in undisturbed.items() if name.startswith("torus/")}
 
 
+def test_an_asset_with_a_high_poly_mesh_has_the_bytes_of_a_single_run_and_one_without_it_fails(
+    runs: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "low").mkdir()
+    (tmp_path / "high").mkdir()
+    for name in ("low/a.obj", "low/b.obj", "high/a.obj"):
+        raised = "0.01" if name.startswith("high") else "0"
+        corners = "".join(f"v {x} {y} {raised}\n" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+        (tmp_path / name).write_text(f"{corners}f 1 2 3 4\n", encoding="utf-8")
+
+    def ran(command: str, mesh: str, high: str, output: str) -> subprocess.CompletedProcess[str]:
+        words = [command, mesh, "-o", output, "--high", high, "--maps", "height", "--size", "32", "--no-preview"]
+        flexpara = [sys.executable, "-m", "flexpara"]
+        return subprocess.run([*flexpara, *words, "--quiet"], cwd=tmp_path, capture_output=True, text=True)
+
+    batch = ran("batch", "low", "high", "out")
+    assert batch.returncode == 2
+    assert f"error: b.obj: {tmp_path}/high holds nothing named like b.obj, expected a file for --high" in batch.stderr
+    assert ran("unwrap", "low/a.obj", "high/a.obj", "single").returncode == 0
+    found = runs.content(tmp_path / "out" / "a")
+    assert {"a.glb", "a_height.exr"} <= set(found)
+    assert found == runs.content(tmp_path / "single")
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="workers are found in /proc")
 def test_a_killed_worker_costs_nothing_but_time(
     runs: Any, meshes: Path, undisturbed: dict[str, object], tmp_path: Path, moment: int
