@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from flexpara.__main__ import app
+from flexpara.__main__ import app, main, unwrap_one
+from flexpara.runtime.batch import commands
 from flexpara.runtime.batch.beside import ENDINGS_OF, options_of_files
 from flexpara.runtime.batch.jobs import Job, find_jobs
 from flexpara.runtime.cli.runfile import facts_of, run_of
-from flexpara.runtime.errors import MissingFileError
+from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.options.unwrap import Options, Outputs
 from flexpara.runtime.options.words import file_fields
 
@@ -143,3 +144,22 @@ def test_a_run_with_files_comes_through_json_as_it_was(tmp_path: Path) -> None:
     run = jobs_of(assets, Options(importance=high, protect=high / "a.npy"), high=(high,))["a.obj"].run
     assert run.options.importance == high / "a.npy"
     assert run_of(json.loads(json.dumps(facts_of(run)))) == run
+
+
+def test_a_batch_is_as_strict_and_as_forceful_as_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n", encoding="utf-8")
+    given: list[Job] = []
+
+    def worked_off(jobs: list[Job], *_: object) -> bool:
+        given.extend(jobs)
+        return True
+
+    monkeypatch.setattr(commands, "done_by_crew", worked_off)
+    words = ["batch", str(tmp_path / "a.obj"), "-o", str(tmp_path / "out"), "--maps", "none"]
+    for more in ((), ("--strict", "--force")):
+        assert main([*words, *more]) == 0
+    plain, strict = (job.run for job in given)
+    assert [(run.strict, run.force) for run in (plain, strict)] == [(False, False), (True, True)]
+    assert given[0].asked("1") != given[1].asked("1")
+    with pytest.raises(InputError, match="leave --strict out"):
+        unwrap_one(strict)
