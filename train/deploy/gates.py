@@ -27,7 +27,7 @@ class Spread(NamedTuple):
 
     x (n, d), y (n, m): minus the mean of the node.  plane (n, d + 1): a gate that parts the samples around this one, in
     the inputs' own coordinates; NaN where none is known.  first (k,): where the rows of each node begin.
-    mean (k, d): of x.
+    mean (k, d): of x.  inputs (n, d): x as given, by which samples are parted; x plus the mean would be rounded anew.
     """
 
     x: NDArray[np.float64]
@@ -35,6 +35,7 @@ class Spread(NamedTuple):
     plane: NDArray[np.float64]
     first: NDArray[np.int64]
     mean: NDArray[np.float64]
+    inputs: NDArray[np.float64]
 
     def each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, …) for each row the value (k, …) of its node."""
@@ -110,12 +111,11 @@ def best_gates(spread: Spread, picks: int, ridge: float, rng: np.random.Generato
     total = spread.total(features)
     pull = ridge * spread.total(np.einsum("nd,nd->n", spread.x, spread.x)) + TINY
     before = _squared_error(total, spread, pull)
-    places = spread.x + spread.each(spread.mean)
     made = [principal_gates(spread), fisher_gates(spread)]
     best = Chosen(np.zeros_like(made[0]), np.full(len(before), np.inf), before, np.zeros(len(before), dtype=bool))
     for i, exact in enumerate((*made, *known_gates(spread, picks, rng))):
         plane = exact.astype(np.float32).astype(np.float64)
-        left = _error_left(plane, places, features, (total, pull), spread)
+        left = _error_left(plane, features, (total, pull), spread)
         better = left < best.left
         best = Chosen(
             np.where(better[:, None], plane, best.plane),
@@ -133,21 +133,20 @@ def second_side(plane: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[n
 
 def _error_left(
     plane: NDArray[np.float64],
-    places: NDArray[np.float64],
     features: NDArray[np.float64],
     whole: tuple[NDArray[np.float64], NDArray[np.float64]],
     spread: Spread,
 ) -> NDArray[np.float64]:
     """(k,) squared error behind gates (k, d + 1); inf where a side is empty or the gate is NaN.
 
-    places: (n, d) the samples.  features: of each.  whole: sums of them over each node, and its ridge.
+    features: of each sample.  whole: sums of them over each node, and its ridge.
     """
     total, pull = whole
     known = np.flatnonzero(np.isfinite(plane[:, 0]))
     left = np.full(len(plane), np.inf)
     if len(known) == 0:
         return left
-    second = second_side(spread.each(plane), places)
+    second = second_side(spread.each(plane), spread.inputs)
     sums = node_sums(features, spread.first, np.flatnonzero(second))[known]
     rest = total[known] - sums
     error = _squared_error(sums, spread, pull[known]) + _squared_error(rest, spread, pull[known])

@@ -211,7 +211,7 @@ def _spread(own: Lesson, first: NDArray[np.int64]) -> Spread:
     count = np.diff(first, append=len(own.x))
     mean_x, mean_y = (node_sums(part, first) / count[:, None] for part in (own.x, own.y))
     x, y = own.x - np.repeat(mean_x, count, axis=0), own.y - np.repeat(mean_y, count, axis=0)
-    return Spread(x, y, own.plane, first, mean_x)
+    return Spread(x, y, own.plane, first, mean_x, own.x)
 
 
 def _settle(nodes: Nodes, gated: NDArray[np.bool_], decided: Decided) -> None:

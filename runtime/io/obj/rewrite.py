@@ -88,14 +88,13 @@ def _faces(text: ObjText, loops: Loops, numbers: NDArray[np.int64]) -> dict[int,
 def _statements(text: ObjText, kinds: dict[int, str], faces: dict[int, list[str]], uv: list[str]) -> Iterator[str]:
     """The statements of the new file: uv stand before the first polygon, old ones and names of libraries go.
 
-    A polygon of which no triangle was unwrapped (it has no area, say) is left out, as in every format:
-    the report's changes count them.  Lines lose their uv.
+    A polygon of which no triangle was unwrapped (it has no area, say, or two corners) is left out, as in every
+    format: the report's changes count them.  Lines lose their uv.
     """
     waiting = uv
-    polygons = set(text.line.tolist())
     for index, statement in text.statements.items():
         kind = kinds[index]
-        if kind in ("vt", "mtllib") or (index in polygons and index not in faces):
+        if kind in ("vt", "mtllib") or (kind == "f" and index not in faces):
             continue
         if kind in ("f", "l"):
             yield from waiting

@@ -130,30 +130,35 @@ def find_layout(
 
 
 def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfig) -> tuple[_Shapes, _Found]:
-    """Shapes of the size at which a first layout needs almost all of a page of so many cells, and that layout.
+    """Shapes of the largest size tried at which a first layout fits on a page of so many cells, and that layout.
 
-    It never needs more.  The padding is a share of its longer side: on a page of as many cells or fewer it is kept.
+    The search ends where almost all of the page is needed.  What a layout needs jumps as the charts grow, so that a
+    guess from the last size may swing to and fro: one beyond what fitted, or beyond what did not, is halved instead.
+    The padding is a share of the page's longer side: on a page of as many cells or fewer it is kept.
     """
     k, extent = len(outlines.outlines), outlines.extent
     first = unit = columns * math.sqrt(config.fill * float(extent.prod()) / outlines.area)
     room = 2.0 * padding * columns * math.sqrt(k)  # what padding takes does not shrink with the charts
-    shapes = outlines.shapes(unit, padding * columns)
-    for _ in range(config.sizings):
+    fitting, too_large = None, math.inf
+    for _ in range(config.sizings + 1):
+        shapes = outlines.shapes(unit, padding * columns)
         found = _first(shapes, columns, config, extent)
-        if (1.0 - config.alike) * columns <= found.side <= columns:
-            return shapes, found
-        if unit < 1e-4 * first:
+        if found.side > columns:
+            too_large = min(too_large, unit)
+        elif fitting is None or unit > fitting[0].unit:
+            fitting = shapes, found
+        if (1.0 - config.alike) * columns <= found.side <= columns or unit < 1e-4 * first:
             break
         wanted = ((1.0 - config.alike / 2.0) * columns - room) / max(found.side - room, 1e-9)
         unit *= min(max(wanted, 0.25), 2.0) if room < columns else 0.25
-        shapes = outlines.shapes(unit, padding * columns)
-    found = _first(shapes, columns, config, extent)
-    if found.side > columns:
+        if fitting is not None and not fitting[0].unit < unit < too_large:
+            unit = fitting[0].unit * math.sqrt(min(too_large / fitting[0].unit, 4.0))
+    if fitting is None:
         raise InputError(
             f"{k} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
             "texels; lower the padding or raise the size"
         )
-    return shapes, found
+    return fitting
 
 
 def _first(shapes: _Shapes, columns: int, config: PlaceConfig, extent: NDArray[np.float64]) -> _Found:

@@ -69,8 +69,9 @@ def test_every_line_but_uv_faces_and_libraries_is_the_file_s(asset: Asset, tmp_p
     assert [line for line in lines if line.startswith("mtllib")] == ["mtllib result.mtl"]
 
 
-def test_a_polygon_without_area_is_left_out(tmp_path: Path) -> None:
-    faces = "f 1 2 3\nf 1 2 2\n"
+@pytest.mark.parametrize("face", ["f 1 2 2", "f 1 2"])
+def test_a_polygon_without_area_or_a_third_corner_is_left_out(face: str, tmp_path: Path) -> None:
+    faces = f"f 1 2 3\n{face}\n"
     (tmp_path / "thin.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + faces, encoding="utf-8")
     asset = shaded(load_asset(tmp_path / "thin.obj"), 30.0)
     assert len(asset.faces) == 1

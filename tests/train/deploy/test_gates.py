@@ -23,7 +23,8 @@ def spread_of(
     sizes = np.array([len(node[0]) for node in nodes])
     unknown = np.full((len(x), x.shape[1] + 1), np.nan)
     mean = np.stack([node[0].mean(axis=0) for node in nodes])
-    return Spread(x, y, unknown if plane is None else plane, np.cumsum(sizes) - sizes, mean)
+    inputs = np.concatenate([node[0] for node in nodes])
+    return Spread(x, y, unknown if plane is None else plane, np.cumsum(sizes) - sizes, mean, inputs)
 
 
 def sheets(gap: float, count: int = 200) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -102,3 +103,16 @@ def test_samples_at_one_point_have_no_gate() -> None:
     chosen = best_gates(spread_of((x, y), sheets(1.0, 40)), 2, 0.0, rng())
     assert np.isinf(chosen.left[0])
     assert np.isfinite(chosen.left[1])
+
+
+def test_a_gate_leaves_samples_on_both_sides_by_the_inputs_themselves() -> None:
+    """All samples lie in a seam's plane: a mean taken off and put back would round some of them across it."""
+    seam = np.array([1.0, 3.0, 5.0, 7.0])
+    x = rng().uniform(-20.0, 0.0, (400, 3))
+    x[:, 2] = -(x[:, :2] @ seam[:2] + seam[3]) / seam[2]
+    x = x[~second_side(np.tile(seam, (len(x), 1)), x)]
+    known = np.tile(seam, (len(x), 1))
+    across = second_side(known, x - x.mean(axis=0) + x.mean(axis=0))
+    assert across.any()
+    chosen = best_gates(spread_of((x, np.column_stack([x[:, 0], 40.0 * across])), plane=known), 1, 1e-6, rng())
+    assert 0 < second_side(chosen.plane.repeat(len(x), axis=0), x).sum() < len(x)

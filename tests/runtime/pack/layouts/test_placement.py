@@ -79,3 +79,20 @@ def test_the_same_generator_gives_the_same_layout() -> None:
 def test_padding_that_leaves_no_room_is_refused() -> None:
     with pytest.raises(InputError, match="9 charts with a padding of 20 % of the atlas side leave no room"):
         found_for(np.ones((9, 2)), 0.2)
+
+
+def test_a_first_layout_that_jumps_as_charts_grow_still_finds_a_size() -> None:
+    """Of a candle's bent strips more fit beside each other, or fewer: guesses from the last size swing to and fro."""
+    rng = np.random.default_rng(55)
+    rng.integers(2, 8)
+    outlines, area = [], 0.0
+    for _ in range(7):
+        outer = np.exp(rng.normal(0.0, 0.4))
+        inner, angle = outer * rng.uniform(0.4, 0.95), rng.uniform(2.0, 5.9)
+        turn = np.linspace(0.0, angle, 20)
+        arc = np.column_stack([np.cos(turn), np.sin(turn)])
+        rim = np.concatenate([arc * outer, arc[::-1] * inner])
+        outlines.append(np.stack([rim, np.roll(rim, -1, axis=0)], axis=1))
+        area += angle / 2.0 * (outer**2 - inner**2)
+    found = find_layout(outlines, area, 8 / 2048, PlaceConfig(tries=0), np.random.default_rng(0))
+    assert found.scale**2 * area > 0.3
