@@ -7,6 +7,7 @@ pattern, {stem} stands for `oak` and {folder} for the folder of the asset: `--hi
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 from fnmatch import fnmatch
 from glob import escape
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 Chosen = TypeVar("Chosen", Options, Outputs)
 
-STEM, FOLDER = "{stem}", "{folder}"
+STEM, FOLDER, WILD = "{stem}", "{folder}", "*?["
 PICTURES = (".npy", ".png", ".jpg", ".jpeg", ".webp")
 ENDINGS_OF = {"high": ENDINGS, "cage": ENDINGS, "start": ENDINGS, "cut": (".txt",), "fields": (".onnx",)}
 ENDINGS_OF |= {"protect": PICTURES, "importance": PICTURES}
@@ -70,7 +71,8 @@ class Beside:
     """Finds files for assets; what lies in a folder is looked up once."""
 
     def __init__(self) -> None:
-        self.folders: dict[tuple[Path, tuple[str, ...]], list[Path]] = {}
+        self.folders: dict[tuple[Path, tuple[str, ...]], dict[str, list[Path]]] = {}
+        self.listings: dict[Path, list[Path]] = {}
 
     def chosen(self, options: Chosen, asset: Path, name: str) -> tuple[Chosen, tuple[Path, ...]]:
         """The options with the files of one asset, as absolute paths, and those files.
@@ -98,31 +100,42 @@ class Beside:
         raise missing(option, f"{place} is not there", "correct the path")
 
     def _of_name(self, option: str, folder: Path, asset: Path, name: str) -> list[Path]:
-        files = [file for file in self._files(folder, option) if file != asset]
+        parts = self._by_part(folder, option).get(part_name(asset.stem), [])
+        files = [file for file in parts if file != asset]
         near = [file for file in files if file.parent == (folder / name).parent]
         for among in (near, files):
             same = [file for file in among if file.stem == asset.stem]
-            part = part_name(asset.stem)
-            found = same or [file for file in among if part_name(file.stem) == part and not is_low(file.stem)]
+            found = same or [file for file in among if not is_low(file.stem)]
             if found:
                 return one_each(option, found)
         raise missing(option, f"{folder} holds nothing named like {name}", "add it, or name it by a pattern")
 
     def _of_pattern(self, option: str, path: Path, asset: Path) -> list[Path]:
         folder = Path(str(path.parent).replace(STEM, asset.stem).replace(FOLDER, str(asset.parent))).absolute()
-        name, kinds = path.name.replace(STEM, escape(asset.stem)), ENDINGS_OF[option]
-        every = sorted(folder.iterdir()) if there(folder) and folder.is_dir() else []
-        found = [file for file in every if file.suffix.lower() in kinds and file != asset and fnmatch(file.name, name)]
+        exact = folder / path.name.replace(STEM, asset.stem)
+        if any(sign in path.name for sign in WILD):
+            name, kinds = path.name.replace(STEM, escape(asset.stem)), ENDINGS_OF[option]
+            alike = [file for file in self._listed(folder) if fnmatch(file.name, name)]
+            found = [file for file in alike if file.suffix.lower() in kinds and file != asset]
+        else:
+            found = [exact] if there(exact) and exact.is_file() and exact != asset else []
         if not found:
-            place = folder / path.name.replace(STEM, asset.stem)
-            raise missing(option, f"{place} is not there", "add it, or correct the pattern")
+            raise missing(option, f"{exact} is not there", "add it, or correct the pattern")
         return one_each(option, found)
 
-    def _files(self, folder: Path, option: str) -> list[Path]:
+    def _listed(self, folder: Path) -> list[Path]:
+        if folder not in self.listings:
+            self.listings[folder] = sorted(folder.iterdir()) if there(folder) and folder.is_dir() else []
+        return self.listings[folder]
+
+    def _by_part(self, folder: Path, option: str) -> dict[str, list[Path]]:
+        """The files below a folder that an option takes, by what low and high ones have in common."""
         kinds = ENDINGS_OF[option]
         if (folder, kinds) not in self.folders:
-            every = sorted(folder.rglob("*"))
-            self.folders[folder, kinds] = [file for file in every if file.suffix.lower() in kinds and file.is_file()]
+            found = self.folders[folder, kinds] = defaultdict(list)
+            for file in sorted(folder.rglob("*")):
+                if file.suffix.lower() in kinds and file.is_file():
+                    found[part_name(file.stem)].append(file)
         return self.folders[folder, kinds]
 
 
