@@ -6,6 +6,7 @@ import ast
 import inspect
 import textwrap
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,13 @@ def test_a_whole_number_of_degrees_is_taken() -> None:
     assert from_keywords(Options, None, {"crease_angle": 45}).crease_angle == 45.0
     with pytest.raises(InputError, match=r"crease_angle is '45', expected .*; pass one of type float"):
         from_keywords(Options, None, {"crease_angle": "45"})
+
+
+def test_files_are_named_by_words_or_paths_one_or_several_and_a_cage_by_a_number() -> None:
+    for given in ("a.obj", Path("a.obj"), ["a.obj"], (Path("a.obj"),)):
+        assert from_keywords(Outputs, None, {"high": given, "cage": 0.1}).high == (Path("a.obj"),)
+    assert from_keywords(Outputs, None, {"high": "a.obj", "cage": 0.1}).cage == "0.1"
+    assert from_keywords(Options, None, {"start": "a.obj"}).start == Path("a.obj")
 
 
 def test_auto_stands_for_what_the_source_has() -> None:
