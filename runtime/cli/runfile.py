@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,10 +106,10 @@ def run_of(facts: dict[str, Any]) -> Run:
     return Run(Path(facts["mesh"]), Path(facts["output"]), options, outputs, every, **manners)
 
 
-def _fields(kind: type, facts: dict[str, Any]) -> dict[str, Any]:
+def _fields(kind: Any, facts: dict[str, Any]) -> dict[str, Any]:
     """The fields of `plain_options`."""
-    files = file_fields(kind)
-    found = {name: as_files(value) if name in files else value for name, value in facts.items()}
+    files = {field.name: field.default for field in fields(kind) if field.name in file_fields(kind)}
+    found = {name: as_files(name, files[name], value) if name in files else value for name, value in facts.items()}
     return {name: tuple(value) if isinstance(value, list) else value for name, value in found.items()}
 
 

@@ -32,24 +32,31 @@ def from_keywords(kind: type[Chosen], made: Chosen | None, keywords: Mapping[str
         remedy = f"pass {close[0]}" if close else "leave it out"
         demand(name in known, f"{name} is no option, expected some of {', '.join(sorted(known))}; {remedy}")
     try:
-        plain = {name: as_files(value) if name in files else value for name, value in keywords.items()}
-        return replace(start, **{name: _as_field(name, known[name], value) for name, value in plain.items()})
+        as_kept = {name: as_files if name in files else _as_field for name in keywords}
+        return replace(start, **{name: as_kept[name](name, known[name], value) for name, value in keywords.items()})
     except TypeError as error:
         raise InputError(f"an option has the wrong type ({error}), expected those of {kind.__name__}") from error
 
 
-def as_files(value: Any) -> Any:
-    """Names of files as paths, one or several; what is none stays for a check to refuse."""
-    if isinstance(value, list | tuple):
-        return tuple(as_files(each) for each in value)
-    return Path(value) if isinstance(value, str) else value
+def as_files(name: str, default: object, value: Any) -> Any:
+    """Names of files as the field holds them: one path or none, or a tuple of them where its default is one.
+
+    Raises: InputError for what is no name of a file.
+    """
+    if default is None and value is None:
+        return None
+    given = value if isinstance(default, tuple) and isinstance(value, list | tuple) else [value]
+    for each in given:
+        found = f"{name} is {str(each)[:60]!r}, expected the name of a file"
+        demand(isinstance(each, str | Path), f"{found}; correct it")
+    paths = tuple(Path(each) for each in given)
+    return paths if isinstance(default, tuple) else paths[0]
 
 
 def _as_field(name: str, default: object, value: Any) -> Any:
     """The value as the field holds it: integers of numpy as int or float, several names as a tuple."""
     if isinstance(default, tuple):
-        several = (value,) if isinstance(value, Path) else value
-        return names(several) if isinstance(several, str) else tuple(several)
+        return names(value) if isinstance(value, str) else tuple(value)
     plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
     plain = float(plain) if type(plain) is int and isinstance(default, float) else plain
     plain = str(plain) if type(plain) in (int, float) and isinstance(default, str) else plain

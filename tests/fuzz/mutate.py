@@ -94,26 +94,31 @@ def in_turn(*mutators: Mutator) -> Mutator:
 
 def other_value(rng: np.random.Generator, tree: Any) -> Any:
     """The tree with one to four of its values replaced, left out, doubled or taken from elsewhere in it."""
-    tree = json.loads(json.dumps(tree))
+    tree = copied(tree)
     for _ in range(1 << int(rng.integers(3))):
         places = list(_places(tree))
         if not places:
-            return pick(rng, VALUES)
+            return copied(pick(rng, VALUES))
         holder, key = pick(rng, places)
         kind = int(rng.integers(6))
         if kind < 3:
-            holder[key] = pick(rng, VALUES)
+            holder[key] = copied(pick(rng, VALUES))
         elif kind == 3:
             del holder[key]
         elif kind == 4:
             other, name = pick(rng, places)
             named = isinstance(other, dict) and name in other
-            holder[key] = json.loads(json.dumps(other[name])) if named else 0
+            holder[key] = copied(other[name]) if named else 0
         elif isinstance(holder[key], list):
             holder[key] = holder[key] * int(rng.integers(2, max(3, MANY // (len(holder[key]) + 1))))
         else:
             holder[key] = [holder[key]] * int(rng.integers(1, 20))
     return tree
+
+
+def copied(tree: Any) -> Any:
+    """The same values anew: one that stood in two places would change in both, or come to hold itself."""
+    return json.loads(json.dumps(tree))
 
 
 def _places(tree: Any) -> Any:

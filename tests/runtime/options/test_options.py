@@ -93,6 +93,13 @@ def test_files_are_named_by_words_or_paths_one_or_several_and_a_cage_by_a_number
         assert from_keywords(Outputs, None, {"high": given, "cage": 0.1}).high == (Path("a.obj"),)
     assert from_keywords(Outputs, None, {"high": "a.obj", "cage": 0.1}).cage == "0.1"
     assert from_keywords(Options, None, {"start": "a.obj"}).start == Path("a.obj")
+    assert from_keywords(Options, Options(start=Path("a.obj")), {"start": None}).start is None
+    for wrong in (3, [3], [["a.obj"]], [None], None, {"a": 1}):
+        with pytest.raises(InputError, match=r"high is .*, expected the name of a file"):
+            from_keywords(Outputs, None, {"high": wrong})
+    for wrong in (3, ["a.obj"], True):
+        with pytest.raises(InputError, match=r"start is .*, expected the name of a file"):
+            from_keywords(Options, None, {"start": wrong})
 
 
 def test_auto_stands_for_what_the_source_has() -> None:
