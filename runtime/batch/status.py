@@ -118,6 +118,8 @@ def _row(output: Path, entry: Entry) -> str:
     picture = next((name for name in entry.files if name.endswith(".preview.png")), None)
     shown = picture is not None and (output / entry.folder / picture).exists()
     image = f'<img src="{quote(f"{entry.folder}/{picture}")}" alt="" loading="lazy">' if shown else ""
+    link = f'<a href="{quote(entry.folder)}/">{escape(entry.asset)}</a>'
+    named = link if entry.status == "done" else escape(entry.asset)
     numbers: Sequence[tuple[object, str]] = [
         (entry.metrics.get("charts"), "{}"),
         (entry.metrics.get(DISTORTION), "{:.4f}"),
@@ -131,8 +133,7 @@ def _row(output: Path, entry: Entry) -> str:
         for value, form in numbers
     )
     return (
-        f"<tr><td>{image}</td><td>{escape(entry.asset)}</td><td>{escape(entry.status)}</td>{cells}"
-        f"<td>{escape(entry.error)}</td></tr>"
+        f"<tr><td>{image}</td><td>{named}</td><td>{escape(entry.status)}</td>{cells}<td>{escape(entry.error)}</td></tr>"
     )
 
 
@@ -144,6 +145,8 @@ TEMPLATE = """<!doctype html>
 body{font:14px system-ui,sans-serif;margin:1.5em}
 table{border-collapse:collapse}
 td,th{padding:.3em .7em;text-align:left;border-bottom:1px solid #8884;vertical-align:middle}
+td:nth-child(2){max-width:28em;overflow-wrap:anywhere}
+td:last-child{max-width:36em;overflow-wrap:anywhere}
 td[data-value]{text-align:right;font-variant-numeric:tabular-nums}
 th button{font:inherit;font-weight:bold;background:none;border:0;padding:0;cursor:pointer;color:inherit}
 th:nth-child(n+4):nth-child(-n+9){text-align:right}

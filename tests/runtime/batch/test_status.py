@@ -43,7 +43,7 @@ def test_the_page_names_all_and_trusts_no_name(tmp_path: Path) -> None:
     evil = replace(ENTRY, asset="<script>.obj", status="failed", error="<b>")
     page = write_page(tmp_path, Status(2, [entry(1), evil])).read_text(encoding="utf-8")
     assert "1 of 2 done" in page
-    assert "1.obj" in page
+    assert '<a href="a/">1.obj</a>' in page
     assert "&lt;script&gt;.obj" in page
     assert "<b>" not in page
     assert "http" not in page
