@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,8 +52,9 @@ class Job:
 
     def content(self) -> str:
         """A fingerprint of the file, of those it names, and of those that its options name; empty for one not read."""
-        given = (self.run.mesh, *self.beside)
-        prints = [_content(file) for path in given for file in (path, *companions(path))]
+        mesh = self.run.mesh
+        prints = [_content(path) for path in (mesh, *companions(mesh))]
+        prints += [_content_once(file) for path in self.beside for file in (path, *companions(path))]
         return prints[0] if len(prints) == 1 else hashlib.sha256("".join(prints).encode()).hexdigest()
 
 
@@ -65,6 +67,20 @@ def _content(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except (OSError, ValueError):  # a name that no file can have
         return ""
+
+
+def _content_once(path: Path) -> str:
+    """The same of a file that many assets may share: read again where its size or its time has changed."""
+    try:
+        facts = path.stat()
+    except (OSError, ValueError):
+        return ""
+    return _known_content(path, facts.st_size, facts.st_mtime_ns)
+
+
+@lru_cache(maxsize=1024)
+def _known_content(path: Path, _size: int, _time: int) -> str:
+    return _content(path)
 
 
 def _named(path: Path) -> str:

@@ -135,7 +135,7 @@ def test_a_changed_file_is_another_content(tmp_path: Path) -> None:
     assets, high = files(tmp_path / "assets", "a.obj"), files(tmp_path / "high", "a.obj")
     before = jobs_of(assets, high=(high,))["a.obj"].content()
     assert before not in ("", jobs_of(assets)["a.obj"].content())
-    (high / "a.obj").write_text("other", encoding="utf-8")
+    (high / "a.obj").write_text("another", encoding="utf-8")
     assert jobs_of(assets, high=(high,))["a.obj"].content() != before
 
 
