@@ -90,7 +90,8 @@ def ended_too(*more: signal.Signals) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, interrupted) for number in (signal.SIGTERM, signal.SIGHUP, *more)}
+    heard = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, interrupted) for number in (*heard, *more)}
     try:
         yield
     finally:

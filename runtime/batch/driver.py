@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     Facts = dict[str, Any]
 
 
-ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Ways to be asked to end beside Ctrl-C, unless they are ignored, as under nohup."""
 
 
 class Crew(Protocol):
@@ -117,7 +118,8 @@ def interrupts() -> Iterator[Interrupts]:
         stop.since = stop.since or time.monotonic()
         stop.count += 1
 
-    before = {number: signal.signal(number, handle) for number in ENDING}
+    heard = [number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, *heard)}
     try:
         yield stop
     finally:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from flexpara.runtime.batch.crew import LocalCrew, shares_of_cores
-from flexpara.runtime.batch.driver import Driver
+from flexpara.runtime.batch.driver import Driver, interrupts
 from flexpara.runtime.batch.jobs import Job, find_jobs
 from flexpara.runtime.batch.lock import locked
 from flexpara.runtime.batch.manifest import Entry, left_to_do, read_entries
@@ -178,6 +178,19 @@ def test_interrupts_give_back_what_is_running(
     assert not whole
     assert list(read_entries(manifest)) == ["a.obj"]
     assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_what_is_ignored_stays_ignored(number: signal.Signals) -> None:
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with interrupts() as stop:
+            os.kill(os.getpid(), number)
+            os.kill(os.getpid(), signal.SIGINT)
+        assert stop.count == 1
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
 
 
 def test_workers_end_with_their_driver(works: str) -> None:
