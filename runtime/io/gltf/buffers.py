@@ -64,12 +64,19 @@ def parse_tree(data: bytes) -> tuple[dict[str, Any], bytes | None]:
     version = str(tree["asset"]["version"])
     if not version.startswith("2."):
         raise MeshError(f"glTF version {version[:20]}, expected 2.x; convert the file")
-    unknown = [name for name in tree.get("extensionsRequired", []) if not str(name).startswith(READ_EXTENSIONS)]
+    _used, required = (names_in(tree, key) for key in ("extensionsUsed", "extensionsRequired"))
+    unknown = [name for name in required if not name.startswith(READ_EXTENSIONS)]
     if unknown:
-        raise MeshError(
-            f"the glTF file requires the extension {str(unknown[0])[:60]!r}, which is not read; export it without"
-        )
+        raise MeshError(f"the glTF file requires the extension {unknown[0][:60]!r}, which is not read; export without")
     return tree, binary
+
+
+def names_in(tree: dict[str, Any], key: str) -> list[str]:
+    """A list of names of the document, empty where it has none.  Raises: MeshError where it is no such list."""
+    found = tree.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+        raise MeshError(f"the glTF file is damaged ({key} is no list of names), expected glTF 2.0; export it again")
+    return found
 
 
 def read_buffers(tree: dict[str, Any], binary: bytes | None, folder: Path) -> list[bytes]:

@@ -270,6 +270,10 @@ def broken(change: str) -> bytes:
             tree["nodes"][0]["children"] = [0]
         case "extension":
             tree["extensionsRequired"] = ["KHR_texture_transform", "ACME_folded_space"]
+        case "used":
+            tree["extensionsUsed"] = 0.5
+        case "used by none":
+            tree["extensionsUsed"] = [["KHR_xmp"]]
         case "version":
             tree["asset"]["version"] = "1.0"
         case "text":
@@ -300,6 +304,8 @@ def broken(change: str) -> bytes:
         ("no stride", "damaged"),
         ("own parent", "several parents"),
         ("extension", "requires the extension .ACME_folded_space"),
+        ("used", "extensionsUsed is no list of names"),
+        ("used by none", "extensionsUsed is no list of names"),
         ("version", "1.0, expected 2"),
         ("text", "damaged"),
         ("list", "damaged"),
