@@ -102,7 +102,7 @@ def _vertices(lines: Lines, changes: dict[str, int]) -> tuple[NDArray[np.float64
     plain = width < numbers.shape[1]
     changes["vertices_without_colors"] = int(np.count_nonzero(plain))
     rgb = np.nan_to_num(numbers[:, first : first + 3])
-    rgb = np.clip(rgb if rgb.max(initial=0.0) > 1.0 else rgb * 255.0, 0.0, 255.0)
+    rgb = np.clip(rgb, 0.0, 255.0) if rgb.max(initial=0.0) > 1.0 else np.clip(rgb, 0.0, 1.0) * 255.0
     rgb[plain] = 255.0
     alpha = np.full((len(rgb), 1), 255.0)
     return numbers[:, :3], np.rint(np.hstack([rgb, alpha])).astype(np.uint8)

@@ -184,6 +184,13 @@ def test_vertices_of_two_numbers_lie_at_z_0() -> None:
     np.testing.assert_array_equal(read("v 1 2\nv 3 4\nv 6 7\nf 1 2 3\n").positions[:, 2], 0.0)
 
 
+def test_a_colour_beyond_all_numbers_is_cut_off() -> None:
+    """Without a warning: those are errors here."""
+    mesh = read_obj(b"v 0 0 0 1 -1e308 0\nv 1 0 0 0 -inf 0\nv 0 1 0 0 0 1\nf 1 2 3\n", lambda _: None)
+    assert mesh.colors is not None
+    assert mesh.colors[:, :3].tolist() == [[255, 0, 0], [0, 0, 0], [0, 0, 255]]
+
+
 def test_vertices_without_colours_among_others_are_white_and_counted() -> None:
     raw = read("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n")
     np.testing.assert_array_equal(raw.colors, [[255, 0, 0, 255], [255, 255, 255, 255], [0, 0, 255, 255]])
