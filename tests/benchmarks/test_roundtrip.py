@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.roundtrip import differences, held, main
+from benchmarks.roundtrip import differences, held, main, without_given
 
 
 def one_square() -> dict[str, Any]:
@@ -36,6 +36,15 @@ def test_each_difference_is_said() -> None:
     turned["normals_0"][0] = [0.0, 1.0, 0.0]
     turned["poses_0"][2] += 0.5
     assert differences(one_square(), turned) == "the same; normals 90°, poses 0.4"
+
+
+def test_a_material_given_to_what_had_none_is_no_difference() -> None:
+    before, after = one_square(), copy.deepcopy(one_square())
+    before["facts"]["objects"][0]["materials"] = []
+    after["facts"]["objects"][0]["materials"] = ["material"]
+    after["facts"]["materials"]["material"] = "DITHERED"
+    assert differences(before, after).startswith("objects")
+    assert differences(before, without_given(after)) == "the same; normals 0°, poses 0"
 
 
 def test_without_bpy_it_says_so_and_ends_well(capsys: pytest.CaptureFixture[str]) -> None:

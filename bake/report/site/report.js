@@ -114,8 +114,9 @@ class Page {
     by("cells-value").textContent = `${settings.cells} texel${settings.cells > 1 ? "s" : ""}`;
     by("level-value").textContent = settings.level ? `${settings.level}${this.cleanUpTo()}` : "smooth";
     by("legend").hidden = settings.look !== "distortion";
-    by("legend-low").textContent = `smaller in uv, ${(100 * (data.top - 1)).toFixed(0)} %`;
-    by("legend-high").textContent = `larger in uv, ${(100 * (data.top - 1)).toFixed(0)} %`;
+    const reach = data.top < 2 ? `${(100 * (data.top - 1)).toFixed(0)} %` : `distortion ${data.top}`;
+    by("legend-low").textContent = `smaller in uv, ${reach}`;
+    by("legend-high").textContent = `larger in uv, ${reach}`;
     paintScale(by("legend-bar"), data.heat);
   }
 
