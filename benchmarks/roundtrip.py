@@ -27,8 +27,8 @@ FOLDERS = ("scenes", "files", "simple")
 CORPUS = ROOT.parent / "shared" / "corpus"
 LIMIT = 300.0
 """Seconds that one program may take on one file."""
-GIVEN = "material"
-"""Name of the material that primitives of glTF get which have none."""
+GIVEN = ("material", "DefaultMaterial")
+"""Names of the material that primitives of glTF get which have none: here, and in Blender where they have colours."""
 KEPT = {".obj": "obj", ".ply": "ply", ".stl": "ply"}
 """Format that a file of such an ending comes back in; glb for all others.
 
@@ -82,12 +82,12 @@ def held(seen: dict[str, Any]) -> str:
 
 
 def without_given(seen: dict[str, Any]) -> dict[str, Any]:
-    """What was seen without the material that primitives have got which had none."""
+    """What was seen without the material of primitives that have none."""
     facts = seen["facts"]
-    kept = [[name for name in thing.get("materials", []) if name != GIVEN] for thing in facts["objects"]]
+    kept = [[name for name in thing.get("materials", []) if name not in GIVEN] for thing in facts["objects"]]
     things = zip(facts["objects"], kept, strict=True)
     objects = [{**thing, **({"materials": names} if "materials" in thing else {})} for thing, names in things]
-    materials = {name: method for name, method in facts["materials"].items() if name != GIVEN}
+    materials = {name: method for name, method in facts["materials"].items() if name not in GIVEN}
     return {**seen, "facts": {**facts, "objects": objects, "materials": materials}}
 
 
@@ -159,7 +159,7 @@ def line_of(path: Path, python: Path, folder: Path, *, through: bool) -> Line:
     said = [text.partition("note: ")[2] for text in done.stderr.splitlines() if "note: " in text]
     report = json.loads((output / f"{path.stem}.report.json").read_text(encoding="utf-8"))
     if given := report["changes"].get("given_materials", 0):
-        after = without_given(after)
+        before, after = without_given(before), without_given(after)
         said.append(f"{given} primitives without material have glTF's default one by name")
     return Line(name, entry, "; ".join([differences(before, after), *said])[:400], validated(result))
 
