@@ -197,7 +197,7 @@ def _obj_uv(data: bytes) -> NDArray[np.float64]:
 
 def _ply_uv(data: bytes) -> NDArray[np.float64]:
     """Columns s and t, and the lists of corners behind the vertices, of a binary file."""
-    head, start = data.split(b"end_header\n", 1)[0].decode("ascii"), data.index(b"end_header\n") + 11
+    head, start = data.split(b"end_header\n", 1)[0].decode(), data.index(b"end_header\n") + 11
     counts = {kind: int(count) for kind, count in re.findall(r"element (\w+) (\d+)", head)}
     vertex = np.dtype([(name, PLY_TYPES[kind]) for kind, name in re.findall(r"property (\w+) (\w+)\n", head)])
     table = np.frombuffer(data, vertex, counts["vertex"], start)

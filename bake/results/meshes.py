@@ -115,6 +115,11 @@ def _as_scene(asset: Asset, outputs: Outputs) -> Asset:
     return with_document(asset)
 
 
+def shown_color(files: Mapping[str, str]) -> str | None:
+    """The file of the picture that formats with one picture show; None where none of those maps was baked."""
+    return next((files[name] for name in SHOWN if name in files), None)
+
+
 def _write_gltf(job: MeshJob, path: Path) -> None:
     """A .glb or .gltf file: the document with new uv, where there is one."""
     if job.asset.document is not None:
@@ -137,7 +142,7 @@ def _write_obj(job: MeshJob, path: Path, faces: NDArray[np.int64]) -> None:
 
     faces: (f,) which of the asset's faces each of the atlas is.
     """
-    shown = next((job.files[name] for name in SHOWN if name in job.files), None)
+    shown = shown_color(job.files)
     if job.asset.obj is None:
         from ...runtime.io.obj.named import named
         from ...runtime.io.obj.write import write_obj
@@ -154,10 +159,11 @@ def _write_obj(job: MeshJob, path: Path, faces: NDArray[np.int64]) -> None:
 
 
 def _write_ply(job: MeshJob, path: Path) -> None:
-    """With the source's vertex colours."""
+    """With the source's vertex colours, and the name of its picture."""
     from ...runtime.io.ply.write import write_ply
 
-    write_ply(job.atlas, path, colors=job.asset.colors, loops=loops_of(job.atlas, job.asset))
+    loops, shown = loops_of(job.atlas, job.asset), shown_color(job.files)
+    write_ply(job.atlas, path, colors=job.asset.colors, loops=loops, texture=shown)
 
 
 def _write_usda(job: MeshJob, path: Path) -> list[Shape]:

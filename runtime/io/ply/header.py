@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...errors import MeshError
-from ..text import shown
+from ..text import decode, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,7 +76,7 @@ def ply_header(data: bytes) -> PlyHeader:
     end = re.compile(rb"[\r\n]end_header[ \t]*(?:" + ends + rb"|$)").search(data[:MAX_HEADER])
     if first is None or end is None:
         raise MeshError("no PLY header, expected 'ply' … 'end_header'; export it again")
-    text = data[: end.start()].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
+    text = decode(data[: end.start()]).replace("\r\n", "\n").replace("\r", "\n")
     lines = [line.split() for line in text.split("\n")]
     order, elements = _parse(lines)
     textures = [" ".join(line[2:]) for line in lines if line[:2] == ["comment", "TextureFile"]]

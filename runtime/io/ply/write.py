@@ -27,7 +27,14 @@ if TYPE_CHECKING:
 WORDS = {"<f8": "double", "<f4": "float", "<i4": "int", "u1": "uchar"}
 
 
-def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = None, loops: Loops | None = None) -> None:
+def write_ply(
+    atlas: Atlas,
+    path: Path,
+    *,
+    colors: NDArray[np.uint8] | None = None,
+    loops: Loops | None = None,
+    texture: str | None = None,
+) -> None:
     """Write binary little-endian PLY: double x y z, float nx ny nz s t, and with colours uchar red green blue alpha.
 
     PLY has one uv per vertex, so vertices are split along seams.
@@ -37,6 +44,8 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
         path: the .ply file.
         colors: (source vertices, 4) uint8, those of the Asset that the atlas came from, or None.
         loops: the polygons to write; None writes the triangles.
+        texture: name of the picture with the base colour, beside the file, in the comment that MeshLab reads; a name
+            that would break the line is left out.
 
     Raises:
         ShapeError: colours of another shape or dtype, or too few of them.
@@ -51,7 +60,8 @@ def write_ply(atlas: Atlas, path: Path, *, colors: NDArray[np.uint8] | None = No
     size = np.full(len(atlas.faces), 3) if loops is None else loops.size
     corner = atlas.faces.reshape(-1) if loops is None else loops.vertex
     kind = "uchar" if int(size.max()) < 256 else "int"
-    head = _ply(columns, [f"element face {len(size)}", f"property list {kind} int vertex_indices"])
+    named = [f"comment TextureFile {texture}"] if texture is not None and texture.isprintable() else []
+    head = _ply(columns, [*named, f"element face {len(size)}", f"property list {kind} int vertex_indices"])
     path.write_bytes(head + _lists(size, corner, 1 if kind == "uchar" else 4))
 
 
@@ -110,4 +120,4 @@ def _ply(columns: list[Column], more: list[str]) -> bytes:
         *more,
         "end_header",
     ]
-    return ("\n".join(header) + "\n").encode("ascii") + table.tobytes()
+    return ("\n".join(header) + "\n").encode() + table.tobytes()

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from flexpara.runtime.errors import InputError, ShapeError
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
@@ -141,6 +142,17 @@ def test_obj_carries_vertex_colours(tmp_path: Path, solid: tuple[np.ndarray, np.
     back = load_asset(tmp_path / "a.obj")
     assert back.colors is not None
     np.testing.assert_array_equal(back.colors[back.faces], colors[atlas.source_vertex[atlas.faces]])
+
+
+def test_ply_names_its_picture_for_those_that_read_it(
+    tmp_path: Path, solid: tuple[np.ndarray, np.ndarray, Atlas]
+) -> None:
+    Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "größe 1.png")
+    write_ply(solid[2], tmp_path / "a.ply", texture="größe 1.png")
+    (material,) = load_asset(tmp_path / "a.ply").materials
+    assert material.pictures["base-color"].pixels[0, 0].tolist() == [9, 8, 7, 255]
+    write_ply(solid[2], tmp_path / "b.ply", texture="a\nelement vertex 9")
+    assert load_asset(tmp_path / "b.ply").materials == ()
 
 
 @pytest.mark.parametrize("writer", [write_obj, write_ply])
