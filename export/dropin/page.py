@@ -16,7 +16,6 @@ import numpy as np
 
 from ...runtime.errors import FinishError, InputError, MeshError
 from ...runtime.geometry.metrics import uv_charts
-from ...runtime.geometry.rows import by_first_appearance, equal_rows, first_of_each
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.io.clean.clean import clean
 from ...runtime.io.rawmesh import LARGEST_DIAGONAL, RawMesh
@@ -28,9 +27,10 @@ from ...runtime.process.progress import Stages
 from ...train.charts.charts import Finished, chart_surface
 from ...train.charts.recut import drawn_again
 from ...train.config import FinishConfig
-from ...train.finish.config import ProjectConfig
 from ...train.finish.projected import projected
 from ...train.pipeline import as_charts
+from .budget import BudgetConfig
+from .meshes import Part, Placed, handed_back
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LOG = logging.getLogger("flexpara.xatlas")
-NOWHERE = 2**32 - 1
-"""Chart of a vertex that is in none."""
 
 
 @dataclass(frozen=True)
@@ -62,18 +60,6 @@ class Wanted(NamedTuple):
     padding: int
 
 
-class Part(NamedTuple):
-    """A mesh as handed over: the number of its vertices, its faces (f, 3), and what can be charted of it.
-
-    asset: its origin and face_material are the vertex (of n) and the face (of f) that each of its own is, or None.
-    """
-
-    vertices: int
-    faces: NDArray[np.int64]
-    asset: Asset | None
-    charts: Charts | None
-
-
 class Page(NamedTuple):
     """The packed page: texels of its side, texels per unit, share that charts cover, number of charts, meshes."""
 
@@ -84,21 +70,6 @@ class Page(NamedTuple):
     meshes: list[Placed]
 
 
-class Placed(NamedTuple):
-    """A mesh of a page: mapping (m,), faces (f, 3), uv (m, 2) in [0, 1]²; chart of faces (f,), −1 for none."""
-
-    mapping: NDArray[np.uint32]
-    faces: NDArray[np.uint32]
-    uv: NDArray[np.float32]
-    face_chart: NDArray[np.int64]
-
-    def vertex_chart(self) -> NDArray[np.uint32]:
-        """(m,) the chart of each vertex, NOWHERE for none."""
-        chart = np.full(len(self.mapping), -1, dtype=np.int64)
-        np.maximum.at(chart, self.faces.reshape(-1), np.repeat(self.face_chart, 3))
-        return np.where(chart < 0, NOWHERE, chart).astype(np.uint32)
-
-
 class Waiting(NamedTuple):
     """A mesh that was handed over: the number of its faces, and how it becomes a part by a deadline."""
 
@@ -107,14 +78,19 @@ class Waiting(NamedTuple):
 
 
 def parts_in_time(waiting: Sequence[Waiting], budget: float | None) -> list[Part]:
-    """Each mesh charted within its share, by faces, of what is left of a budget in seconds; None is no limit."""
-    start, left, parts = time.monotonic(), sum(mesh.faces for mesh in waiting), list[Part]()
+    """Each mesh charted within its share, by faces, of what is left of a budget in seconds; None is no limit.
+
+    What packing the meshes before it will take is none of its share.
+    """
+    start, done, left, parts = time.monotonic(), 0, sum(mesh.faces for mesh in waiting), list[Part]()
+    packing = BudgetConfig().packing
     for mesh in waiting:
         seconds = None
         if budget is not None:
-            seconds = max(budget - (time.monotonic() - start), 0.0) * mesh.faces / max(left, 1)
+            unspent = budget - (time.monotonic() - start) - packing * done
+            seconds = max(unspent, 0.0) * mesh.faces / max(left, 1)
         parts.append(mesh.part(Deadline(seconds)))
-        left -= mesh.faces
+        left, done = left - mesh.faces, done + mesh.faces
     return parts
 
 
@@ -127,6 +103,7 @@ def surface_part(
     kept = np.flatnonzero(fine[faces].all(axis=1))
     origin = np.arange(len(positions))
     raw = RawMesh(np.where(fine[:, None], positions, 0.0), faces[kept], face_material=kept, origin=origin)
+    start = time.monotonic()
     try:
         asset = clean(raw) if len(kept) else None
     except MeshError as error:
@@ -134,18 +111,24 @@ def surface_part(
         asset = None
     if asset is None:
         return Part(len(positions), faces, None, None)
-    return Part(len(positions), faces, asset, charted(asset.surface, charts, seed, deadline))
+    pace = BudgetConfig().pace(len(kept), time.monotonic() - start)
+    return Part(len(positions), faces, asset, charted(asset.surface, charts, seed, deadline, pace), pace)
 
 
-def charted(surface: Surface, charts: int, seed: int, deadline: Deadline) -> Charts:
-    """Charts of a welded surface, in its units; projections where our own were refused, which is logged."""
+def charted(surface: Surface, charts: int, seed: int, deadline: Deadline, pace: float = 1.0) -> Charts:
+    """Charts of a welded surface, in its units; projections where our own were refused, which is logged.
+
+    pace: how many times as long as foreseen things take.
+    """
+    config = FinishConfig()
+    config = replace(config, haste=replace(config.haste.at_pace(pace), strict=True))
     frame = Frame.of(surface.vertices)
     ball = Surface(frame.apply(surface.vertices), surface.faces)
     try:
-        finished = chart_surface(ball, charts, FinishConfig(), seed, Stages(deadline=deadline))
+        finished = chart_surface(ball, charts, config, seed, Stages(deadline=deadline))
     except FinishError as error:
         LOG.warning("charts by projection: %s", error)
-        pieces = projected(ball, np.arange(len(ball.faces)), float(ball.face_areas().sum()), ProjectConfig())
+        pieces = projected(ball, np.arange(len(ball.faces)), float(ball.face_areas().sum()), config.project)
         finished = Finished(pieces, math.inf, {}, ())
     found = as_charts(ball, finished)
     return replace(found, corner_uv=found.corner_uv * frame.scale)
@@ -188,14 +171,20 @@ def joined(assets: list[Asset], charts: list[Charts]) -> tuple[Asset, Charts]:
     return whole, Charts(chart, corner_uv, chart, np.arange(len(method)), method)
 
 
-def packed_page(parts: list[Part], wanted: Wanted, seed: int, config: PageConfig = PageConfig()) -> Page:
-    """All meshes on one page, at one texel density; a page without side where nothing can be charted."""
+def packed_page(
+    parts: list[Part], wanted: Wanted, seed: int, deadline: Deadline, config: PageConfig = PageConfig()
+) -> Page:
+    """All meshes on one page, at one texel density; a page without side where nothing can be charted.
+
+    Charts lie in rows where the deadline is too near for anything better.
+    """
     assets = [part.asset for part in parts if part.asset is not None]
     if not assets:
         nothing = np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64)
         return Page(0, 0.0, 0.0, 0, [handed_back(part, *nothing) for part in parts])
     asset, charts = joined(assets, [part.charts for part in parts if part.charts is not None])
-    packed, charts, side = _in_page(asset, charts, wanted, seed, config)
+    packing = Packing(asset, seed, deadline, max(part.pace for part in parts))
+    packed, charts, side = packing.on_page(charts, wanted, config)
     area = float(np.abs(signed_areas(packed.atlas.corner_uv)).sum())
     meshes, face = [], 0
     for part in parts:
@@ -208,74 +197,54 @@ def packed_page(parts: list[Part], wanted: Wanted, seed: int, config: PageConfig
     return Page(side, packed.report["chart_scale"] * side, area, len(charts.method), meshes)
 
 
-def _in_page(asset: Asset, charts: Charts, wanted: Wanted, seed: int, config: PageConfig) -> tuple[Packed, Charts, int]:
-    """The charts on a page of the side asked for; on a larger one where padding or texel density want it."""
-    side = min(wanted.resolution or config.side, config.largest)
-    while True:
-        try:
-            packed, charts = _valid(asset, charts, side, wanted.padding, seed)
-        except InputError:
-            if side >= config.largest:
-                raise
-            LOG.warning("%d texels leave no room for %d of padding: %d", side, wanted.padding, 2 * side)
-            side = min(2 * side, config.largest)
-            continue
-        density = packed.report["chart_scale"] * side
-        needed = math.ceil(config.dense * side * wanted.texels_per_unit / density)
-        if wanted.resolution or not wanted.texels_per_unit or abs(needed - side) <= 0.02 * side:
-            break
-        if side == (side := min(max(needed, 1), config.largest)):
-            break
-        wanted = wanted._replace(resolution=side)
-    if density < wanted.texels_per_unit:
-        LOG.warning("%g texels per unit on one page of %d, fewer than the %g asked for", density, side, wanted[1])
-    return packed, charts, side
+class Packing(NamedTuple):
+    """What charts of a mesh are packed by; pace: how many times as long as foreseen things take."""
 
+    asset: Asset
+    seed: int
+    deadline: Deadline
+    pace: float
+    budget: BudgetConfig = BudgetConfig()
 
-def _valid(asset: Asset, charts: Charts, side: int, padding: int, seed: int) -> tuple[Packed, Charts]:
-    """The charts packed, those that float32 can't hold drawn again; layouts of others stay as they are."""
-    config = PackConfig()
-    packed = pack(asset, charts, size=side, padding=padding, seed=seed, config=config)
-    for _ in range(config.recuts):
-        if len(packed.invalid) == 0 or "uv" in charts.method:
-            break
-        charts = drawn_again(asset.surface, charts, packed.invalid, packed.atlas.corner_uv, config.least_edge)[0]
-        packed = pack(asset, charts, size=side, padding=padding, seed=seed, config=config)
-    if len(packed.invalid):
-        LOG.warning("%d charts hold triangles that overlap or lie upside down", len(packed.invalid))
-    return packed, charts
+    def on_page(self, charts: Charts, wanted: Wanted, config: PageConfig) -> tuple[Packed, Charts, int]:
+        """The charts on a page of the side asked for; on a larger one where padding or texel density want it."""
+        side = min(wanted.resolution or config.side, config.largest)
+        while True:
+            try:
+                packed, charts = self.valid(charts, side, wanted.padding)
+            except InputError:
+                if side >= config.largest:
+                    raise
+                LOG.warning("%d texels leave no room for %d of padding: %d", side, wanted.padding, 2 * side)
+                side = min(2 * side, config.largest)
+                continue
+            density = packed.report["chart_scale"] * side
+            needed = math.ceil(config.dense * side * wanted.texels_per_unit / density)
+            if wanted.resolution or not wanted.texels_per_unit or abs(needed - side) <= 0.02 * side:
+                break
+            if side == (side := min(max(needed, 1), config.largest)):
+                break
+            wanted = wanted._replace(resolution=side)
+        if density < wanted.texels_per_unit:
+            text = "%g texels per unit on one page of %d, fewer than the %g asked for"
+            LOG.warning(text, density, side, wanted.texels_per_unit)
+        return packed, charts, side
 
+    def valid(self, charts: Charts, side: int, padding: int) -> tuple[Packed, Charts]:
+        """The charts packed, those that float32 can't hold drawn again; layouts of others stay as they are."""
+        packed, recuts = self.packed(charts, side, padding), PackConfig().recuts
+        for _ in range(recuts):
+            if len(packed.invalid) == 0 or "uv" in charts.method:
+                break
+            least, written = PackConfig().least_edge, packed.atlas.corner_uv
+            charts = drawn_again(self.asset.surface, charts, packed.invalid, written, least)[0]
+            packed = self.packed(charts, side, padding)
+        if len(packed.invalid):
+            LOG.warning("%d charts hold triangles that overlap or lie upside down", len(packed.invalid))
+        return packed, charts
 
-def handed_back(part: Part, corner_uv: NDArray[np.float64], chart: NDArray[np.int64]) -> Placed:
-    """The mesh as it was handed over, its vertices doubled along seams; corner_uv (m, 3, 2) of the faces charted."""
-    uv, face_chart = np.zeros((len(part.faces), 3, 2)), np.full(len(part.faces), -1)
-    if len(part.faces) == 0:
-        return Placed(np.zeros(0, np.uint32), np.zeros((0, 3), np.uint32), np.zeros((0, 2), np.float32), face_chart)
-    if part.asset is not None and part.asset.face_material is not None and part.asset.origin is not None:
-        kept, corner = part.asset.face_material, part.asset.origin[part.asset.faces]
-        turned = corner[:, 1] != part.faces[kept, 1]
-        uv[kept] = np.where(turned[:, None, None], corner_uv[:, [0, 2, 1]], corner_uv)
-        face_chart[kept] = chart
-        left_out = np.flatnonzero(face_chart < 0)
-        uv[left_out] = _points(part, uv, kept, left_out)[:, None]
-    bits = uv.astype(np.float32).view(np.int32).reshape(-1, 2).astype(np.int64)
-    label = by_first_appearance(equal_rows(np.column_stack([part.faces.reshape(-1), bits])))
-    first = first_of_each(label)
-    return Placed(
-        part.faces.reshape(-1)[first].astype(np.uint32),
-        label.reshape(-1, 3).astype(np.uint32),
-        uv.reshape(-1, 2)[first].astype(np.float32),
-        face_chart,
-    )
-
-
-def _points(
-    part: Part, uv: NDArray[np.float64], kept: NDArray[np.int64], left_out: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """(d, 2) where each face that is no triangle lies: at one of its vertices, (0, 0) where none is charted."""
-    place, known = np.zeros((part.vertices, 2)), np.zeros(part.vertices, dtype=np.bool_)
-    place[part.faces[kept]] = uv[kept]
-    known[part.faces[kept]] = True
-    corners = part.faces[left_out]
-    chosen = corners[np.arange(len(corners)), np.argmax(known[corners], axis=1)]
-    return place[chosen]
+    def packed(self, charts: Charts, side: int, padding: int) -> Packed:
+        """The charts close together, or in rows where there is no time for that."""
+        needed = self.pace * self.budget.packs(len(self.asset.faces), len(charts.method))
+        config = PackConfig(hurried=self.deadline.passed(needed))
+        return pack(self.asset, charts, size=side, padding=padding, seed=self.seed, config=config)

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import FlexparaError, ShapeError
-from .page import LOG, NOWHERE, Page, Placed, Waiting, Wanted, packed_page, parts_in_time, surface_part, uv_part
+from ...runtime.process.deadline import Deadline
+from .meshes import NOWHERE, Placed
+from .page import LOG, Page, Waiting, Wanted, packed_page, parts_in_time, surface_part, uv_part
 from .plainarrays import RefusedError, drawn, export, faces_of, rows
 
 if TYPE_CHECKING:
@@ -180,12 +182,20 @@ class Atlas:
         chosen = pack_options or PackOptions()
         for options in (chart_options or ChartOptions(), chosen):
             _say_unused(options)
+        deadline = Deadline(settings.time_budget)
         parts = parts_in_time(self._waiting, settings.time_budget)
         padding = max(int(chosen.padding), 1 if chosen.bilinear else 0)
         wanted = Wanted(int(chosen.resolution), float(chosen.texels_per_unit), padding)
-        self._page = packed_page(parts, wanted, settings.seed) if parts else None
+        self._page = packed_page(parts, wanted, settings.seed, deadline) if parts else None
         draws = self._page is not None and self._page.side > 0 and chosen.create_image
         self._image = drawn(self._page.meshes, self._page.side) if self._page is not None and draws else None
+        if deadline.passed():
+            faces = sum(mesh.faces for mesh in self._waiting)
+            LOG.warning(
+                "%d faces took longer than the %g s asked for: reading, projecting and packing alone do",
+                faces,
+                deadline.seconds,
+            )
         if verbose:
             LOG.warning("%d meshes, %d charts, %d texels", len(self), self.chart_count, self.width)
 

@@ -14,7 +14,8 @@ from ..mesh import Charts, Surface
 from .density import pack_square
 from .exact.lattice import STEPS
 from .growing.outlines import chart_outlines, outline_edges
-from .packing import Packed, atlas_of_corners, on_lattice
+from .packing import Packed, atlas_of_corners
+from .sheet import on_lattice
 from .stacking import Stacks, find_stacks
 
 if TYPE_CHECKING:

@@ -67,6 +67,20 @@ class NestConfig:
 
 
 @dataclass(frozen=True)
+class RowConfig:
+    """Charts in rows of their boxes, where there is no time for another layout."""
+
+    angles: int = 12
+    """Angles within a quarter turn of which the one with the least box is taken."""
+    halvings: int = 40
+    """How often the range of their scale is halved."""
+    smallest: float = 1e-4
+    """Scale, as a share of the one that fills the page, at which they have to fit."""
+    slack: float = 48.0
+    """What is kept free beyond the padding, so that repairs on the lattice ask for no second layout; lattice units."""
+
+
+@dataclass(frozen=True)
 class GrowthConfig:
     """Linear programs that move placed charts and let them grow until they jam."""
 
@@ -146,6 +160,9 @@ class PackConfig:
     stack: Stack = "off"
     whole_texels: bool = False
     """Whether the edges of charts that are rectangles lie between texels."""
+    hurried: bool = False
+    """Whether charts lie in rows of their boxes, found at once, instead of close together."""
+    rows: RowConfig = field(default_factory=RowConfig)
     place: PlaceConfig = field(default_factory=PlaceConfig)
     nest: NestConfig = field(default_factory=NestConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)

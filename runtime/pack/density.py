@@ -15,7 +15,8 @@ from .config import PackConfig
 from .exact.lattice import STEPS
 from .growing.outlines import chart_outlines, outline_edges
 from .layouts.texels import aligned
-from .packing import Fitted, Packed, as_atlas, in_uv, on_lattice, pack
+from .packing import Packed, as_atlas, pack
+from .sheet import Fitted, in_uv, on_lattice
 
 if TYPE_CHECKING:
     from ..mesh import Asset, Charts

@@ -24,13 +24,14 @@ from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
 from ..pagesize import PageSize
 from .config import PackConfig
-from .exact.lattice import STEPS, Snapped, snap
+from .exact.lattice import STEPS
 from .exact.seamvertices import atlas_normals, split_vertices
-from .growing.growth import apply_placement, grown
+from .growing.growth import grown
 from .growing.outlines import chart_outlines, outline_edges, rotation, upright_angle
 from .layouts.nesting import find_nested
 from .layouts.placement import Layout, find_layout
 from .layouts.texels import aligned
+from .sheet import Fitted, Sheet, in_rows, in_uv, on_lattice
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,15 +87,8 @@ def pack(
     page = PageSize.of(size)
     _check(asset, charts, page, padding)
     edges = outline_edges(asset.surface.faces, charts)
-    places, report = _placed(charts, chart_outlines(charts, edges), page, padding, config, seed)
-    jammed = [_grown(charts, edges, _Place(first, page, padding), config, 2.0) for first in places]
-    best = max(range(len(jammed)), key=lambda number: scale_of(jammed[number][0]))
-    fit = partial(fitted_charts, asset.surface.faces, charts, edges, _Place(places[best], page, padding), config)
-    fitted = fit(2.0, jammed[best])
-    for _ in range(config.lattice.retries):
-        if fitted.snapped.farthest <= fitted.slack:
-            break
-        fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
+    lay_out = in_rows if config.hurried else _close_together
+    fitted, report = lay_out(Sheet(asset.surface.faces, charts, edges, page, padding), config, seed)
     scale = scale_of(fitted.placement)
     if config.whole_texels:
         placement = aligned(in_uv(fitted.placement, page), chart_outlines(charts, edges), page, config)
@@ -109,6 +103,21 @@ def pack(
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
     report |= {"invalid_charts": snapped.invalid.tolist(), "settings": asdict(config)}
     return Packed(atlas, snapped.invalid, report)
+
+
+def _close_together(sheet: Sheet, config: PackConfig, seed: int) -> tuple[Fitted, dict[str, Any]]:
+    """Charts grown from the better of their first placements, and what limits them."""
+    mesh, charts, edges, page, padding = sheet
+    places, report = _placed(charts, chart_outlines(charts, edges), page, padding, config, seed)
+    jammed = [_grown(charts, edges, _Place(first, page, padding), config, 2.0) for first in places]
+    best = max(range(len(jammed)), key=lambda number: scale_of(jammed[number][0]))
+    fit = partial(fitted_charts, mesh, charts, edges, _Place(places[best], page, padding), config)
+    fitted = fit(2.0, jammed[best])
+    for _ in range(config.lattice.retries):
+        if fitted.snapped.farthest <= fitted.slack:
+            break
+        fitted = fit(fitted.snapped.farthest + 2.0)  # what the repair of slivers moves must not cost padding
+    return fitted, report
 
 
 def _placed(
@@ -154,11 +163,6 @@ def scale_of(placement: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.linalg.det(placement[0, :, :2])))
 
 
-def in_uv(placement: NDArray[np.float64], page: PageSize) -> NDArray[np.float64]:
-    """A placement (k, 2, 3) in sides of the page as one in uv; the very array on a square page."""
-    return placement if page.is_square else placement / page.extent[:, None]
-
-
 def as_atlas(asset: Asset, charts: Charts, fitted: Fitted, page: PageSize, padding: int) -> Atlas:
     """The mesh with vertices doubled along seams, and the lattice points as their uv."""
     faces, source_vertex, _ = split_vertices(asset.faces, charts.face_chart, charts.corner_uv)
@@ -199,20 +203,6 @@ class _Place(NamedTuple):
     padding: int
 
 
-class Fitted(NamedTuple):
-    """Charts that jammed, on the lattice: faces (f, 3) over its points, one for each place of a vertex in a chart.
-
-    placement: (k, 2, 3) in sides of the page.  uv_placement: the same in uv, rectangles on whole texels.
-    """
-
-    placement: NDArray[np.float64]
-    uv_placement: NDArray[np.float64]
-    skipped: int
-    snapped: Snapped
-    faces: NDArray[np.int64]
-    slack: float
-
-
 Grown: TypeAlias = "tuple[NDArray[np.float64], int]"
 """A placement (k, 2, 3) of charts that jammed, and how many steps on the way had no solution."""
 
@@ -240,21 +230,6 @@ def fitted_charts(
     placed = in_uv(placement, first.page)
     faces, snapped = on_lattice(mesh, charts, edges, placed, config)
     return Fitted(placement, placed, skipped, snapped, faces, slack)
-
-
-def on_lattice(
-    mesh: NDArray[np.int64],
-    charts: Charts,
-    edges: NDArray[np.bool_],
-    placement: NDArray[np.float64],
-    config: PackConfig,
-) -> tuple[NDArray[np.int64], Snapped]:
-    """Charts of faces mesh (f, 3) where they are placed in uv (k, 2, 3): faces, and their vertices snapped."""
-    faces, _, flat = split_vertices(mesh, charts.face_chart, charts.corner_uv)
-    chart = np.zeros(len(flat), dtype=np.int64)
-    chart[faces] = charts.face_chart[:, None]
-    uv = apply_placement(placement, chart, flat[:, None])[:, 0]
-    return faces, snap(uv, faces, charts.face_chart, edges, config.lattice)
 
 
 def atlas_from_uv(asset: Asset) -> Atlas:

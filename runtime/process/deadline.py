@@ -45,7 +45,11 @@ class Deadline:
 
     def passed(self, reserve: float = 0.0) -> bool:
         """True where someone asked, or where fewer than ``reserve`` seconds of the budget are left."""
-        return self.asked or (self.seconds is not None and time.monotonic() - self._start + reserve >= self.seconds)
+        return self.asked or self.is_spent(reserve)
+
+    def is_spent(self, reserve: float = 0.0) -> bool:
+        """True where fewer than ``reserve`` seconds of the budget are left, whether someone asked or not."""
+        return self.seconds is not None and time.monotonic() - self._start + reserve >= self.seconds
 
 
 @contextmanager

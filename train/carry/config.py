@@ -104,12 +104,31 @@ class FineConfig:
 
 @dataclass(frozen=True)
 class HasteConfig:
-    """What a time budget has to leave for all that follows the search."""
+    """What a time budget has to leave for all that follows the search; seconds of one core."""
 
     seconds: float = 1.0
     """Of any surface …"""
     seconds_per_face: float = 6e-5
-    """… and for each of its faces: they are carried back, laid out, proven and packed."""
+    """… and for each of its faces: they are thinned, carried back, laid out, proven and packed."""
+    strict: bool = False
+    """Whether the budget counts more than good charts: layouts end in time too, and what has none is projected."""
+    last: float = 0.3
+    """What has to be left of any surface when the last layout ends …"""
+    proving: float = 1.1e-5
+    """… for each face, which is proven, packed and handed back …"""
+    projecting: float = 1.0e-5
+    """… and for each that has no layout by then and is projected, by all cores."""
+    thinning: float = 1.2e-5
+    """What is foreseen for each face of a part that is thinned …"""
+    laying: float = 0.8e-5
+    """… for laying out the half of its faces, by all cores …"""
+    handle: float = 0.02
+    """… and for each of its handles, which a search has to cut, by all cores."""
+
+    def at_pace(self, factor: float) -> HasteConfig:
+        """The same on a machine that takes so many times as long."""
+        slower = {name: factor * seconds for name, seconds in vars(self).items() if name != "strict"}
+        return replace(self, **slower)
 
 
 @dataclass(frozen=True)

@@ -48,18 +48,23 @@ if TYPE_CHECKING:
 
 
 def refined(
-    surface: Surface, middle: Surface, pieces: list[Piece], config: FinishConfig, late: Late = never
+    surface: Surface,
+    middle: Surface,
+    pieces: list[Piece],
+    config: FinishConfig,
+    late: Late = never,
+    last: Late = never,
 ) -> list[Piece]:
     """The charts of the middle mesh on the surface; one that can't be laid out like its source is flattened anew.
 
     Once it is ``late``, borders of many charts are not weighed, a valid layout may be worse than its source, charts
-    lose all that folds, and what has no layout is projected.
+    lose all that folds, and what has no layout is projected; from the ``last`` moment on, whatever is left.
     """
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     groups = carried_groups(surface, graph, middle, pieces, config, late)
     groups.sort(key=lambda group: -len(group.ids))
     total = float(surface.face_areas().sum())
-    found = parallel_map(lambda group: refined_piece(surface, group, total, config, late), groups)
+    found = parallel_map(lambda group: [] if last() else refined_piece(surface, group, total, config, late), groups)
     failed = [group for group, of_one in zip(groups, found, strict=True) if not of_one]
     if late() and failed:
         left = np.sort(np.concatenate([group.ids for group in failed]))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,10 +22,12 @@ from ..carry.straighten import straightened
 from ..finish.energies import finished_by
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
+from ..finish.projected import projected
 from ..finish.slits import Flat
 from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
 from .given import Improved, best_of_copies, given_charts, improvement, no_worse
+from .haste import Haste
 from .mirror import mirror_of, mirrored_charts
 from .notes import hurried, kept_isometric, mirror_facts, notes
 from .objective import objective, priced, rank
@@ -39,7 +40,6 @@ from .starts import NOTHING, Starts, best_search
 from .tighten import back_on, is_asked, settled, tightened
 
 if TYPE_CHECKING:
-    from ...runtime.process.deadline import Late
     from ..config import FinishConfig
     from ..search.search import Search
     from .starts import Known
@@ -84,27 +84,29 @@ class Work:
     stage: Stages
     known: Known
     given: dict[int, Search]
-    late: Late
+    haste: Haste
 
     def solve(self, number: int) -> Solved:
         """Charts of a part."""
         part, config = self.parts[number], self.config
+        if self.haste.last():
+            return projected_part(part.surface, config)
         part = part._replace(surface=steadied(part.surface, config.sliver))
         own = priced(config, config.slit.seams.moved(part.origin, part.scale))
         bound = self.given.get(number)
         solved = self.mirrored(part, own, bound) if config.symmetry.axis != "none" else self.plain(part, own, bound)
         if bound is None:
             return solved
-        return solved._replace(pieces=no_worse(solved.pieces, bound, self.charts, own, self.late))
+        return solved._replace(pieces=no_worse(solved.pieces, bound, self.charts, own, self.haste.late))
 
     def plain(self, part: Part, config: FinishConfig, bound: Search | None) -> Solved:
         """Charts as they come, those too long for the page cut; bound: an atlas to start from."""
         share, most = part.scale**2 / self.total, config.closing.charts
-        starts = Starts(part, most, share, config, self.seed, self.known.scores, self.late, bound)
+        starts = Starts(part, most, share, config, self.seed, self.known.scores, self.haste, bound)
         solved = solve_part(part.surface, self.charts, starts, config)
         polygon = None if self.surface.polygon is None else self.surface.polygon[part.ids]
         page = Page(float(np.sqrt(self.total)) / part.scale, self.charts, polygon)
-        if config.stretch:
+        if config.stretch or self.haste.last():
             return solved
         return solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
 
@@ -117,7 +119,7 @@ class Work:
         def half(surface: Surface, most: int, own: FinishConfig) -> list[Piece]:
             return chart_surface(surface, most, own, self.seed, Stages(deadline=self.stage.deadline)).pieces
 
-        pieces = mirrored_charts(part.surface, mirror, self.charts, config, half, self.late)
+        pieces = mirrored_charts(part.surface, mirror, self.charts, config, half, self.haste.late)
         found = Solved(pieces, "mirrored", mirror.unlike)
         if config.symmetry.axis != "auto":
             return found
@@ -142,15 +144,19 @@ def chart_surface(
     Raises:
         FinishError: the result failed the exact check (a defect).
     """
+    haste = Haste(stage.deadline, len(surface.faces), config.haste)
+    late = haste.late
+    if haste.is_hopeless(len(surface.faces)):
+        pieces = projected_part(surface, config).pieces
+        return Finished(pieces, objective(surface, pieces, config.slit.price), {}, tuple(hurried(stage.deadline, late)))
     stage("parts")
     parts = split_parts(surface, config.congruence)
     total = sum(part.scale**2 for part in parts)
     stage("charts")
-    late = partial(stage.deadline.passed, config.haste.seconds + config.haste.seconds_per_face * len(surface.faces))
     given = given_charts(parts, known.corner_uv, config)
     first = [number for number, part in enumerate(parts) if part.copy_of < 0]
     bounds = best_of_copies(given, parts, charts)
-    work = Work(surface, parts, total, charts, config, seed, stage, known, bounds, late)
+    work = Work(surface, parts, total, charts, config, seed, stage, known, bounds, haste)
     largest_first = sorted(first, key=lambda number: -len(parts[number].ids))
     # one that is most of the work uses all cores itself; else each core works on a part of its own
     apart = int(2 * len(parts[largest_first[0]].ids) > sum(len(parts[number].ids) for number in first))
@@ -182,8 +188,16 @@ def chart_surface(
     return Finished(pieces, cost, facts, told, better)
 
 
+def projected_part(surface: Surface, config: FinishConfig) -> Solved:
+    """A part for which there is no time."""
+    ids, area = np.arange(len(surface.faces)), float(surface.face_areas().sum())
+    return Solved(projected(surface, ids, area, config.project), "projected")
+
+
 def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
     """Charts of a connected manifold of area 1."""
+    if starts.is_hopeless:
+        return projected_part(surface, config)
     exact = unfolded_part(surface, charts, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
@@ -196,7 +210,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     if not starts.late():
         found = tightened(found, charts, config, starts.late) if asked else found
         found = found if starts.holed else straightened(found, config.bands)
-    pieces = brought_back((surface, middle, coarse), found, charts, config, starts.late, asked=asked)
+    pieces = brought_back((surface, middle, coarse), found, charts, config, starts, asked=asked)
     facets = exact.pieces if exact is not None and exact.way == "facets" else []
     if facets and rank(facets, surface, charts, config) <= rank(pieces, surface, charts, config):
         return Solved(facets, "facets")
@@ -213,7 +227,7 @@ def brought_back(
     found: Search,
     charts: int,
     config: FinishConfig,
-    late: Late,
+    starts: Starts,
     *,
     asked: bool,
 ) -> list[Piece]:
@@ -221,9 +235,9 @@ def brought_back(
 
     asked: few charts or short seams were, so that what was closed is led back as a network of seams.
     """
-    surface, middle, coarse = levels
+    (surface, middle, coarse), late = levels, starts.haste.late
     if late() and coarse is not surface:
-        return refined(surface, coarse, list(found.pieces.values()), config, late)
+        return refined(surface, coarse, list(found.pieces.values()), config, late, starts.haste.last)
     if coarse is not middle:
         found = (back_on if asked else carried_back)(middle, coarse, found, charts, config)
     if not late():
@@ -231,7 +245,7 @@ def brought_back(
         found = settled(found, charts, config, late)
     found.mend()
     pieces = list(found.pieces.values())
-    return pieces if middle is surface else refined(surface, middle, pieces, config, late)
+    return pieces if middle is surface else refined(surface, middle, pieces, config, late, starts.haste.last)
 
 
 def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:

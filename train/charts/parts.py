@@ -52,7 +52,7 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
     size = np.bincount(component)
     twins = np.bincount(size)  # by number of faces: parts that have so many
     parts: list[Part] = []
-    known: dict[bytes, list[int]] = {}
+    known: dict[bytes, list[Known]] = {}
     for ids in np.split(order, np.cumsum(size)[:-1]):
         part = extracted(vertices, faces, ids)
         if twins[len(ids)] > 1:
@@ -61,14 +61,26 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
     return parts
 
 
-def compared(part: Part, parts: list[Part], known: dict[bytes, list[int]], tolerance: float) -> Part:
-    """A part, named a copy where it is one of those before it.  known: numbers of those that are none, by pattern."""
+class Known(NamedTuple):
+    """The number of a part that is no copy, and how widely its corners are spread, which is that of its copies too."""
+
+    number: int
+    spread: float
+
+
+def compared(part: Part, parts: list[Part], known: dict[bytes, list[Known]], tolerance: float) -> Part:
+    """A part, named a copy where it is one of those before it.  known: those that are none, by pattern."""
+    corners = part.surface.triangles.reshape(-1, 3)
+    spread = float(np.linalg.norm(corners - corners.mean(axis=0)))
     for mirrored in (False, True):
         key = pattern(part.surface.faces, mirrored=mirrored)
-        same = next((n for n in known.get(key, []) if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
+        # no corner of a copy is farther off than the tolerance: so far may their spread differ
+        off = 2.0 * tolerance * spread * np.sqrt(3.0 * len(corners))
+        alike = (each.number for each in known.get(key, []) if abs(each.spread - spread) <= off)
+        same = next((n for n in alike if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
         if same >= 0:
             return part._replace(copy_of=same, mirrored=mirrored)
-    known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(len(parts))
+    known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(Known(len(parts), spread))
     return part
 
 

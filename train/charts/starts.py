@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import compress
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
-from ...runtime.process.deadline import Late, never
 from ..search.labels import dual_graph
 from ..search.search import Search
 from ..search.starts import clusters, pieces_by_score
 from ..workers import parallel_map
 from .given import as_start
+from .haste import Haste
 from .objective import rank
 from .proof import is_valid
 
@@ -52,6 +52,7 @@ class Starts:
     """Where the searches of a part begin.
 
     share: of the whole surface's area, which decides how long is searched.  given: an atlas of the part, made valid.
+    haste: how near the deadline is.
     """
 
     part: Part
@@ -60,8 +61,19 @@ class Starts:
     config: FinishConfig
     seed: int
     scores: Scores | None
-    late: Late = never
+    haste: Haste = field(default_factory=Haste)
     given: Search | None = None
+
+    def late(self) -> bool:
+        """Whether searches have to end."""
+        return self.haste.late()
+
+    @cached_property
+    def is_hopeless(self) -> bool:
+        """Whether no search is begun at all, since there is no time to lay out what it would find."""
+        faces = len(self.part.ids)
+        many = faces > self.config.fine.above * self.middle
+        return self.haste.is_hopeless(faces, self.handles, thinned=many)
 
     @property
     def faces(self) -> int:
@@ -143,9 +155,9 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
     rounds = config.few_rounds if starts.small else config.rounds
     few = config.closing.charts
-    ahead = parallel_map(lambda search: search.finish(few, rounds, starts.late), ahead)
+    ahead = parallel_map(lambda search: search.finish(few, rounds, starts.late, starts.haste.last), ahead)
     best = min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, few, config))
-    return best if charts <= few else best.finish(charts, rounds, starts.late)
+    return best if charts <= few else best.finish(charts, rounds, starts.late, starts.haste.last)
 
 
 def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:

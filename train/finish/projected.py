@@ -14,6 +14,7 @@ from scipy import sparse
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import components, edge_table, face_components
+from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
 from ..workers import parallel_map
 from .contact import excess_energy
@@ -116,12 +117,19 @@ def laid_out(
 
 def seen_from(part: Surface, rows: NDArray[np.int64], way: NDArray[np.float64]) -> Flat:
     """Faces (n,) in the plane across a direction, at the size that they have in space."""
+    own, _ = part.part(rows)
+    uv = own.vertices @ across(*way.tolist())
+    area = own.face_areas().sum() / max(float(signed_areas(uv[own.faces]).sum()), 1e-300)
+    return Flat(own, uv * np.sqrt(area), {})
+
+
+@cache
+def across(x: float, y: float, z: float) -> NDArray[np.float64]:
+    """(3, 2) two unit vectors at right angles to a third, and to each other: seen from it, they turn to the left."""
+    way = np.array([x, y, z])
     first = np.cross(way, np.eye(3)[np.abs(way).argmin()])
     first /= np.linalg.norm(first)
-    own, _ = part.part(rows)
-    uv = own.vertices @ np.stack([first, np.cross(way, first)], axis=1)
-    area = own.face_areas().sum() / max(float(own.face_cross().sum(axis=0) @ way) / 2.0, 1e-300)
-    return Flat(own, uv * np.sqrt(area), {})
+    return np.stack([first, np.cross(way, first)], axis=1)
 
 
 def layers(centroids: NDArray[np.float64], pairs: NDArray[np.int64], way: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -187,16 +187,17 @@ class Search(State):
         self.merge(0.0, 0, late)
         return self
 
-    def finish(self, most: int, rounds: int, late: Late = never) -> Self:
+    def finish(self, most: int, rounds: int, late: Late = never, last: Late = never) -> Self:
         """Merge down to ``most`` pieces as far as the stretch allows, then split and merge where that pays.
 
-        The search itself is returned.  Once it is ``late``, only what the limits on pieces and stretch ask for.
+        The search itself is returned.  Once it is ``late``, only what the limits on pieces and stretch ask for; from
+        the ``last`` moment on, nothing.
         """
-        self.merge_down(most)
+        self.merge_down(most, last)
         for _ in range(rounds):
             if late() or len(self.settled) >= self.config.vain_splits or not self.improve(most):
                 break
-        self.split_down()
+        self.split_down(last)
         return self
 
     def merge(self, least: float, down_to: int, late: Late = never) -> None:
@@ -207,7 +208,7 @@ class Search(State):
                 return
             self.apply_merge(best, least)
 
-    def merge_down(self, most: int) -> None:
+    def merge_down(self, most: int, last: Late = never) -> None:
         """Merge down to ``most`` pieces, whatever that costs within the bounds of stretch.
 
         Where they do not go that far, the limit is broken anyway: then the objective decides.  Pieces far above the
@@ -215,7 +216,7 @@ class Search(State):
         """
         before, cost = dict(self.pieces), self.objective()
         if len(before) <= most + self.config.start.crowded:
-            self.merge(-np.inf, most)
+            self.merge(-np.inf, most, last)
         if len(self.pieces) > most and self.objective() > cost:
             self.pieces = before
 
@@ -256,9 +257,9 @@ class Search(State):
         """True where the mean excess of a piece is so high that it is split before others are merged."""
         return piece.energy * self.area > self.config.stretched * float(self.areas[piece.ids].sum())
 
-    def split_down(self) -> None:
+    def split_down(self, last: Late = never) -> None:
         """Split, whatever the limit on charts, until the stretch is within bounds or no split lowers it."""
-        while self.energy() > self.config.most_excess and self.split_worst():
+        while self.energy() > self.config.most_excess and not last() and self.split_worst():
             pass
 
     def split_worst(self) -> bool:

@@ -15,6 +15,7 @@ from flexpara.runtime.geometry.overlap import overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table, face_components
 from flexpara.runtime.geometry.triangles import signed_areas
 from flexpara.runtime.mesh import Asset, Atlas, Charts, Surface
+from flexpara.runtime.pack.config import PackConfig
 from flexpara.runtime.pack.growing.growth import apply_placement
 from flexpara.runtime.pack.packing import atlas_from_uv, pack
 
@@ -110,6 +111,17 @@ def test_four_squares_lie_exactly_two_paddings_apart(size: int, padding: int) ->
     assert measured_gap(asset, atlas) >= 2 * padding
     side = np.sqrt(np.abs(signed_areas(atlas.corner_uv)).sum() / 4.0) * size
     assert side == pytest.approx((size - 4 * padding) / 2.0, rel=0.01)
+
+
+@pytest.mark.parametrize("size", [512, "1024x256"])
+def test_charts_in_rows_keep_their_padding_and_one_scale(size: Size) -> None:
+    rng = np.random.default_rng(3)
+    asset, charts = rectangles(np.exp(rng.normal(size=(40, 2))), rng.uniform(0.0, 2.0 * np.pi, 40))
+    found = pack(asset, charts, size=size, padding=2, config=PackConfig(hurried=True))
+    assert len(found.invalid) == 0
+    assert 4.0 <= measured_gap(asset, found.atlas) < 4.5
+    ratio = np.abs(signed_areas(found.atlas.corner_uv * found.atlas.page)) / np.abs(signed_areas(charts.corner_uv))
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -68,3 +68,11 @@ def test_other_threads_leave_signals_alone() -> None:
     thread.start()
     thread.join()
     assert seen == [before]
+
+
+def test_a_request_spends_no_budget() -> None:
+    deadline = Deadline(1000.0)
+    deadline.ask()
+    assert deadline.passed()
+    assert not deadline.is_spent()
+    assert deadline.is_spent(reserve=1001.0)
