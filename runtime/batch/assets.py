@@ -40,7 +40,7 @@ def assets_of(places: Iterable[Path], output: Path, options: Options, outputs: O
     """The meshes of folders (and those in them), lists and single files, each once.  As `jobs.find_jobs`."""
     found: dict[Path, Found] = {}
     for place in places:
-        if place.suffix in LISTS:
+        if place.suffix.lower() in LISTS:
             found |= {asset.mesh: asset for asset in _listed(place, options, outputs)}
         else:
             names = _in_folder(place, output, note) if place.is_dir() else _single(place)
