@@ -114,5 +114,6 @@ def test_a_gate_leaves_samples_on_both_sides_by_the_inputs_themselves() -> None:
     known = np.tile(seam, (len(x), 1))
     across = second_side(known, x - x.mean(axis=0) + x.mean(axis=0))
     assert across.any()
-    chosen = best_gates(spread_of((x, np.column_stack([x[:, 0], 40.0 * across])), plane=known), 1, 1e-6, rng())
+    y = np.column_stack([x[:, 0], 40.0 * across.astype(np.float64)])
+    chosen = best_gates(spread_of((x, y), plane=known), 1, 1e-6, rng())
     assert 0 < second_side(chosen.plane.repeat(len(x), axis=0), x).sum() < len(x)
