@@ -32,11 +32,18 @@ class Surface:
     faces: (f, 3) int64, no degenerate face; consistently oriented where that is possible.  Faces that lie on each other
     (second sides, copies) have vertices of their own at the same places.
     polygon: (f,) int64, the same for faces that were one polygon in the file; None where that isn't known.
+    calm: (v, 3) float64, where the vertices would lie without the noise of a scanner; None where they show none.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     polygon: NDArray[np.int64] | None = None
+    calm: NDArray[np.float64] | None = None
+
+    @property
+    def shape(self) -> Surface:
+        """The same faces without noise; the surface itself where it shows none."""
+        return self if self.calm is None else Surface(self.calm, self.faces, self.polygon)
 
     @property
     def triangles(self) -> NDArray[np.float64]:

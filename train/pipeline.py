@@ -78,7 +78,8 @@ def train(
         FinishError: no valid charts could be made (a defect).
     """
     frame = Frame.of(surface.vertices)
-    ball = replace(surface, vertices=frame.apply(surface.vertices))
+    calm = None if surface.calm is None else frame.apply(surface.calm)
+    ball = replace(surface, vertices=frame.apply(surface.vertices), calm=calm)
     opened = ball if wanted.cut is None else cut_along(ball, wanted.cut)
     finish = at_places(config.finish, ball, config.places, wanted.protected)
     known = Known(corner_uv=wanted.start)
@@ -138,7 +139,8 @@ def at_places(
 def cut_along(surface: Surface, wanted: NDArray[np.bool_]) -> Surface:
     """The surface, its faces in their order, open along edges (e,) of its table."""
     faces, old = split_non_manifold_vertices(surface.faces, wanted, edge_table(surface.faces))
-    return replace(surface, vertices=surface.vertices[old], faces=faces)
+    calm = None if surface.calm is None else surface.calm[old]
+    return replace(surface, vertices=surface.vertices[old], faces=faces, calm=calm)
 
 
 def as_charts(surface: Surface, finished: Finished) -> Charts:

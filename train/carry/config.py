@@ -63,6 +63,8 @@ class FineConfig:
     """Parts of more than so many times as many are thinned."""
     early: int = 3
     """The quick thinning ends at so many times the faces wanted; the careful one does the rest."""
+    closed: int = 6
+    """Specks that the quick thinning may close: 1 for a hole, 2 for a handle."""
     haste: float = 3.0
     """How fast the threshold of the quick thinning rises: 7 is its library's default, 0 the most careful."""
     jitter: float = 0.03

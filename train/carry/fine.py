@@ -60,8 +60,9 @@ def refined(
     Once it is ``late``, borders of many charts are not weighed, a valid layout may be worse than its source, charts
     lose all that folds, and what has no layout is projected; from the ``last`` moment on, whatever is left.
     """
-    graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
-    groups = carried_groups(surface, graph, middle, pieces, config, late)
+    shape = surface.shape
+    graph = dual_graph(shape, edge_table(surface.faces), config.labels.seams)
+    groups = carried_groups(shape, graph, middle, pieces, config, late)
     groups.sort(key=lambda group: -len(group.ids))
     total = float(surface.face_areas().sum())
     found = parallel_map(lambda group: [] if last() else refined_piece(surface, group, total, config, late), groups)
@@ -70,7 +71,7 @@ def refined(
         left = np.sort(np.concatenate([group.ids for group in failed]))
         found.append(projected(surface, left, total, config.project))
         failed = []
-    anew = State(surface, graph, config) if failed else None
+    anew = State(shape, graph, config) if failed else None
     if anew is not None:
         anew.add_all_valid([(group.ids, group.source.slits) for group in failed])
     charts = [of_one[0] for of_one in found if of_one] + ([] if anew is None else list(anew.pieces.values()))
@@ -90,15 +91,16 @@ def refined_piece(
     whole = extract(surface, ids)
     allowed = config.carry.worse * source.energy + config.carry.slack * float(whole.face_areas().sum()) / total
     best: list[Piece] = []
+    noisy = surface.calm is not None  # how much a chart stretches is the noise's doing then
     for disk in opened_alike(whole, source, config):
         uv, wrong = laid_out(disk, source.flat, config, near)
         found = without_folds(surface, ids, Flat(disk, uv, {}), wrong, total, config, late)
         if found and (not best or total_cost(found, config) < total_cost(best, config)):
             best = found
-        if best and (best[0].energy <= allowed or late()):
+        if best and (best[0].energy <= allowed or noisy or late()):
             break
     torn = len(best) > config.fine.scraps and len(ids) <= config.fine.anew
-    dear = bool(best) and best[0].energy > allowed and len(ids) <= config.fine.largest
+    dear = bool(best) and best[0].energy > allowed and not noisy and len(ids) <= config.fine.largest
     if not best or ((torn or dear) and not late()):
         return []
     return [replace(best[0], slits=source.slits, resort=source.resort), *best[1:]]

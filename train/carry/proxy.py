@@ -25,7 +25,8 @@ def thinned(surface: Surface, config: FineConfig) -> Surface:
 
     Quadric errors again, but edges below a rising threshold collapse in the order they come in (Forstmann, Fast
     quadric mesh simplification).  In a plane every collapse is free, and slivers are what is left: vertices are moved
-    a little first, so that short edges cost least.  ``simplified`` does the rest, and all where the topology changed.
+    a little first, so that short edges cost least.  ``simplified`` does the rest, and all where the topology changed
+    by more than a few specks that noise had left.
     """
     if len(surface.faces) <= config.early * config.faces:
         return simplified(surface, config.faces)
@@ -35,8 +36,8 @@ def thinned(surface: Surface, config: FineConfig) -> Surface:
         moved, manifold.astype(np.int32), target_count=config.early * config.faces, agg=config.haste
     )
     coarse = compact(np.asarray(found[0], dtype=np.float64), np.asarray(found[1], dtype=np.int64))
-    same = topology_of(coarse.faces) == topology_of(manifold) and len(coarse.faces) < len(surface.faces)
-    return simplified(coarse if same else surface, config.faces)
+    alike = is_as_simple(coarse.faces, manifold, config.closed) and len(coarse.faces) < len(surface.faces)
+    return simplified(coarse if alike else surface, config.faces)
 
 
 def jittered(vertices: NDArray[np.float64], faces: NDArray[np.int64], share: float) -> NDArray[np.float64]:
@@ -47,6 +48,15 @@ def jittered(vertices: NDArray[np.float64], faces: NDArray[np.int64], share: flo
     np.minimum.at(shortest, faces, np.minimum(length, np.roll(length, 1, axis=1)))
     moves = np.random.default_rng(0).normal(scale=share, size=vertices.shape)
     return vertices + moves * np.where(np.isfinite(shortest), shortest, 0.0)[:, None]
+
+
+def is_as_simple(coarse: NDArray[np.int64], fine: NDArray[np.int64], closed: int) -> bool:
+    """True where thinned faces have the topology of the fine ones, or lack so many of their handles and holes at most.
+
+    closed: how much higher the Euler characteristic may be: by 1 for a hole, by 2 for a handle.
+    """
+    (euler, loops, tangled), (fine_euler, fine_loops, _) = topology_of(coarse), topology_of(fine)
+    return not tangled and 0 <= euler - fine_euler <= closed and loops <= fine_loops
 
 
 def topology_of(faces: NDArray[np.int64]) -> tuple[int, int, bool]:

@@ -103,10 +103,10 @@ class Work:
         """Charts as they come, those too long for the page cut; bound: an atlas to start from."""
         share, most = part.scale**2 / self.total, config.closing.charts
         starts = Starts(part, most, share, config, self.seed, self.known.scores, self.haste, bound)
-        solved = solve_part(part.surface, self.charts, starts, config)
         polygon = None if self.surface.polygon is None else self.surface.polygon[part.ids]
         page = Page(float(np.sqrt(self.total)) / part.scale, self.charts, polygon)
-        if config.stretch or self.haste.last():
+        solved = solve_part(part.surface, starts, page, config)
+        if config.stretch or (starts.carried and solved.way == "searched") or self.haste.last():
             return solved
         return solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
 
@@ -194,15 +194,15 @@ def projected_part(surface: Surface, config: FinishConfig) -> Solved:
     return Solved(projected(surface, ids, area, config.project), "projected")
 
 
-def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConfig) -> Solved:
-    """Charts of a connected manifold of area 1."""
+def solve_part(surface: Surface, starts: Starts, page: Page, config: FinishConfig) -> Solved:
+    """Charts of a connected manifold of area 1; where they are carried to it from another mesh, they fit the page."""
+    charts, shape = page.most, surface.shape
     if starts.is_hopeless:
         return projected_part(surface, config)
-    exact = unfolded_part(surface, charts, starts.handles, config)
+    exact = unfolded_part(shape, charts, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
-    many = len(surface.faces) > config.fine.above * starts.middle
-    middle = thinned(surface, replace(config.fine, faces=starts.middle)) if many else surface
+    middle = thinned(shape, replace(config.fine, faces=starts.middle)) if starts.many else shape
     whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)
     found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
@@ -210,7 +210,7 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
     if not starts.late():
         found = tightened(found, charts, config, starts.late) if asked else found
         found = found if starts.holed else straightened(found, config.bands)
-    pieces = brought_back((surface, middle, coarse), found, charts, config, starts, asked=asked)
+    pieces = brought_back((surface, middle, coarse), found, starts, page, asked=asked)
     facets = exact.pieces if exact is not None and exact.way == "facets" else []
     if facets and rank(facets, surface, charts, config) <= rank(pieces, surface, charts, config):
         return Solved(facets, "facets")
@@ -225,19 +225,20 @@ def solve_part(surface: Surface, charts: int, starts: Starts, config: FinishConf
 def brought_back(
     levels: tuple[Surface, Surface, Surface],
     found: Search,
-    charts: int,
-    config: FinishConfig,
     starts: Starts,
+    page: Page,
     *,
     asked: bool,
 ) -> list[Piece]:
     """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy.
 
+    Where there is a middle mesh, charts too long for the page are cut there: a tenth of the faces says where as well.
     asked: few charts or short seams were, so that what was closed is led back as a network of seams.
     """
-    (surface, middle, coarse), late = levels, starts.haste.late
+    (surface, middle, coarse), late, last = levels, starts.haste.late, starts.haste.last
+    charts, config = page.most, starts.config
     if late() and coarse is not surface:
-        return refined(surface, coarse, list(found.pieces.values()), config, late, starts.haste.last)
+        return refined(surface, coarse, list(found.pieces.values()), config, late, last)
     if coarse is not middle:
         found = (back_on if asked else carried_back)(middle, coarse, found, charts, config)
     if not late():
@@ -245,7 +246,9 @@ def brought_back(
         found = settled(found, charts, config, late)
     found.mend()
     pieces = list(found.pieces.values())
-    return pieces if middle is surface else refined(surface, middle, pieces, config, late, starts.haste.last)
+    if starts.carried and not (config.stretch or late()):
+        pieces = shortened(middle, pieces, page if middle is surface else page._replace(polygon=None), config)
+    return pieces if middle is surface else refined(surface, middle, pieces, config, late, last)
 
 
 def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:

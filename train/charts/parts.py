@@ -46,7 +46,8 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
         tolerance: distance, as a share of the part's size, up to which the vertices of a copy coincide.
     """
     faces, old = split_non_manifold_vertices(surface.faces)
-    vertices, table = surface.vertices[old], edge_table(faces)
+    table = edge_table(faces)
+    opened = Surface(surface.vertices[old], faces, calm=None if surface.calm is None else surface.calm[old])
     component = face_components(len(faces), table.edge_faces[table.manifold])
     order = stable_order(component, len(faces))
     size = np.bincount(component)
@@ -54,7 +55,7 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
     parts: list[Part] = []
     known: dict[bytes, list[Known]] = {}
     for ids in np.split(order, np.cumsum(size)[:-1]):
-        part = extracted(vertices, faces, ids)
+        part = extracted(opened, ids)
         if twins[len(ids)] > 1:
             part = compared(part, parts, known, tolerance)
         parts.append(part)
@@ -84,18 +85,20 @@ def compared(part: Part, parts: list[Part], known: dict[bytes, list[Known]], tol
     return part
 
 
-def extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], ids: NDArray[np.int64]) -> Part:
+def extracted(surface: Surface, ids: NDArray[np.int64]) -> Part:
     """Faces ids (m,) as a surface of area 1 around its mean, its vertices numbered as its faces first name them."""
-    corner = faces[ids].reshape(-1)
+    corner = surface.faces[ids].reshape(-1)
     number = named(corner)
-    points = vertices[corner[first_of_each(number)]]
+    old = corner[first_of_each(number)]
+    points = surface.vertices[old]
     origin = points.mean(axis=0)
     points = points - origin
     renumbered = number.reshape(-1, 3)
     area = float(Surface(points, renumbered).face_areas().sum())
     extent = float(np.ptp(points, axis=0).max())
     scale = float(np.sqrt(area)) if area > 0.0 else (extent or 1.0)
-    return Part(ids, Surface(points / scale, renumbered), scale, origin)
+    calm = None if surface.calm is None else (surface.calm[old] - origin) / scale
+    return Part(ids, Surface(points / scale, renumbered, calm=calm), scale, origin)
 
 
 def pattern(faces: NDArray[np.int64], *, mirrored: bool) -> bytes:

@@ -8,6 +8,7 @@ room for.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +38,7 @@ def steadied(surface: Surface, config: SliverConfig) -> Surface:
         table = table or edge_table(surface.faces)
         beyond = faces_beyond(surface.faces, table.face_edges, table.edge_faces, sliver, longest[0][sliver])
         vertices = moved(vertices, surface.faces, sliver, longest[0][sliver], beyond, least * (1.0 + attempt))
-    return surface if vertices is surface.vertices else Surface(vertices, surface.faces)
+    return surface if vertices is surface.vertices else replace(surface, vertices=vertices)
 
 
 def longest_sides(

@@ -71,9 +71,7 @@ class Starts:
     @cached_property
     def is_hopeless(self) -> bool:
         """Whether no search is begun at all, since there is no time to lay out what it would find."""
-        faces = len(self.part.ids)
-        many = faces > self.config.fine.above * self.middle
-        return self.haste.is_hopeless(faces, self.handles, thinned=many)
+        return self.haste.is_hopeless(len(self.part.ids), self.handles, thinned=self.many)
 
     @property
     def faces(self) -> int:
@@ -87,6 +85,16 @@ class Starts:
         """Faces of the middle mesh."""
         fine = self.config.fine
         return max(round(fine.faces * np.sqrt(self.share)), min(fine.fewest, fine.faces))
+
+    @property
+    def carried(self) -> bool:
+        """Whether charts are found on another mesh than the part's, a thinned one or one without noise."""
+        return self.many or self.part.surface.calm is not None
+
+    @property
+    def many(self) -> bool:
+        """Whether the part has so many faces that it is thinned."""
+        return len(self.part.surface.faces) > self.config.fine.above * self.middle
 
     @property
     def whole(self) -> int:

@@ -50,6 +50,26 @@ class CloudConfig:
     """Loops longer than so many times hole_edges are no chains of small holes that touch at vertices."""
     hole_width: float = 5.0
     """Widest extent of a loop that is closed."""
+    folded: float = 0.2
+    """Cosine between a triangle's normal and its corners' below which it is folded, on the calm shape, and of one that
+    closes over what was cut out."""
+    noise_rings: int = 4
+    """Rings around a fold or a small handle that are cut out at most, until what is left can be closed."""
+    noise_reach: int = 10
+    """Rings around all such places that are looked at after the first time."""
+    handle_edges: int = 16
+    """Longest way around and through a handle that is cut out."""
+    noise_edges: int = 48
+    """Longest boundary loop that is closed where something was cut out …"""
+    noise_width: float = 12.0
+    """… and its widest extent."""
+    noise: float = 0.1
+    """Typical distance of a point from the mean of its neighbours, beyond theirs, from which charts are found on a
+    calmer shape …"""
+    calming: int = 5
+    """… that so many rounds of moving points there lead to …"""
+    farthest: float = 2.0
+    """… by so many times that distance at most: at creases the mean lies far off."""
     rounds: int = 4
     """Times pinches are removed and holes closed."""
     extrapolation: float = 0.5

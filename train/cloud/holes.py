@@ -27,6 +27,7 @@ def hole_triangles(
     spacing: NDArray[np.float64],
     faces: NDArray[np.int64],
     config: CloudConfig,
+    among: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
     """Triangles (t, 3) int64 that close the small boundary loops of faces (f, 3) int64; whole holes or nothing of them.
 
@@ -36,8 +37,10 @@ def hole_triangles(
         spacing: (d,) float64 local spacing.
         faces: (f, 3) int64.
         config: the numbers of holes.
+        among: (d,) bool, the vertices that a loop has to consist of; None: of any.
     """
     whole = [loop for loop in boundary_loops(faces) if len(loop) <= config.touching_holes * config.hole_edges]
+    whole = whole if among is None else [loop for loop in whole if among[loop].all()]
     loops = [simple[::-1] for loop in whole for simple in simple_loops(loop) if 3 <= len(simple) <= config.hole_edges]
     there, taken = np.sort(_edge_keys(faces, len(points))), set[int]()
     closed: list[NDArray[np.int64]] = [np.zeros((0, 3), dtype=np.int64)]

@@ -20,8 +20,10 @@ from ...runtime.geometry.topology import components, split_non_manifold_vertices
 from ...runtime.geometry.triangles import corner_angles
 from ...runtime.io.points.cloud import CloudMesh, distinct_points, with_changes
 from ...runtime.mesh import Asset, Surface
+from .calm import calm_shape
 from .config import CloudConfig
 from .holes import hole_triangles
+from .noise import without_noise
 from .normals import disagreement, fitted_normals, local_spacing, oriented_normals, thinned_out, turned_to
 from .stars import star_candidates
 
@@ -72,7 +74,8 @@ def reconstruct(cloud: PointCloud, config: CloudConfig | None = None) -> CloudMe
             "give more of them"
         )
     used, faces = compacted(faces)
-    surface = Surface(local.points[used], faces)
+    shape = calm_shape(local.points[used], local.normals[used], local.spacing[used], faces, config)
+    surface = Surface(local.points[used], faces, calm=shape)
     user = distinct.first[local.chosen[used]]
     vertex = np.full(len(distinct.first), -1, dtype=np.int64)
     vertex[local.chosen[used]] = np.arange(len(used))
@@ -137,13 +140,29 @@ def triangulated(
         config: numbers.
     """
     faces = assembled(star_candidates(points, normals, index, spacing, config), len(points))
+    faces = closed(points, normals, spacing, faces, config)
+    shape = calm_shape(points, normals, spacing, faces, config)
+    noisy = shape is not None
+    calm = without_noise(shape if noisy else points, normals, spacing, faces, config, folds=noisy)
+    faces = faces if calm is faces else closed(points, normals, spacing, calm, config)
+    return _without_small_pieces(faces, config.least_faces)
+
+
+def closed(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    config: CloudConfig,
+) -> NDArray[np.int64]:
+    """The faces (f, 3) without pinches, small holes closed; arguments as of ``triangulated``."""
     for _ in range(config.rounds):
         closing = hole_triangles(points, normals, spacing, faces, config)
         whole = without_pinches(points, np.concatenate([faces, closing]))
         if len(closing) == 0 and len(whole) == len(faces):
             break
         faces = whole
-    return _without_small_pieces(faces, config.least_faces)
+    return faces
 
 
 def assembled(found: Candidates, count: int) -> NDArray[np.int64]:

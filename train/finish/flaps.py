@@ -114,10 +114,16 @@ def is_valid(flat: Flat, fresh: int) -> bool:
 
     All faces near them are tested: a flap may lie over the inside of a piece without crossing its border.
     """
-    corners = flat.uv[flat.surface.faces]
-    lowest, highest = corners[-fresh:].min(axis=(0, 1)), corners[-fresh:].max(axis=(0, 1))
-    near = (corners.max(axis=1) >= lowest).all(axis=1) & (corners.min(axis=1) <= highest).all(axis=1)
-    return not flipped_triangles(corners[-fresh:]).any() and not overlaps_anywhere(corners[near])
+    faces = flat.surface.faces
+    corners = flat.uv[faces[-fresh:]]
+    if flipped_triangles(corners).any():
+        return False
+    near = np.ones(len(faces), dtype=bool)
+    for axis in range(2):  # corner by corner: a reduction over an axis of three takes ten times as long
+        a, b, c = (flat.uv[:, axis][faces[:, corner]] for corner in range(3))
+        near &= np.maximum(np.maximum(a, b), c) >= corners[:, :, axis].min()
+        near &= np.minimum(np.minimum(a, b), c) <= corners[:, :, axis].max()
+    return not overlaps_anywhere(flat.uv[faces[near]])
 
 
 def are_clear(uv: NDArray[np.float64], first: int, clear: float) -> bool:

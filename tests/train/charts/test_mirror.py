@@ -62,7 +62,7 @@ def images(surface: Surface, axis: int) -> np.ndarray:
 
 
 def test_a_plane_is_found_across_its_axis_alone_and_says_which_faces_are_images() -> None:
-    part = extracted(twice().vertices, twice().faces, np.arange(len(twice().faces)))
+    part = extracted(twice(), np.arange(len(twice().faces)))
     assert mirror_of(part.surface, SymmetryConfig("y")) is None
     found = mirror_of(part.surface, SymmetryConfig("auto"))
     assert found is not None
@@ -90,7 +90,7 @@ def test_the_image_of_each_chart_is_a_chart_of_the_same_energy(price: float) -> 
 
 def test_a_half_is_charted_by_the_search_s_energy_whatever_finishes_the_whole() -> None:
     whole, seen = twice(), list[str]()
-    surface = extracted(whole.vertices, whole.faces, np.arange(len(whole.faces))).surface
+    surface = extracted(whole, np.arange(len(whole.faces))).surface
 
     def solve(half: Surface, most: int, config: FinishConfig) -> list[Piece]:
         seen.append(config.energy.kind)

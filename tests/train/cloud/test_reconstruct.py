@@ -134,10 +134,11 @@ def test_unoriented_samples_of_a_surface_give_its_topology(name: str, euler: int
     assert is_manifold(faces)
     assert euler_characteristic(faces) == euler
     assert len(boundary_loops(faces)) == (name == "cloth")
-    assert mesh.asset.changes.get("points_without_triangle", 0) <= 8
+    few = 0.025 * len(points) if noise else 8  # points of folds go, at creases most
+    assert mesh.asset.changes.get("points_without_triangle", 0) <= few
     corner = mesh.asset.surface.triangles[mesh.point_face]
     distance = np.linalg.norm(np.einsum("ni,nic->nc", mesh.point_weight, corner) - points, axis=1)
-    assert np.count_nonzero(distance) <= 8
+    assert np.count_nonzero(distance) <= few
 
 
 @pytest.mark.parametrize("shape", [(40, 60), (13, 8)])
