@@ -53,7 +53,9 @@ def seen_by_blender(python: Path, path: Path, folder: Path, export: Path | None 
     result = folder / f"{path.name}.npz"
     script = str(Path(__file__).with_name("blender_scene.py"))
     command = [str(python), script, str(path), str(result), *([str(export)] if export else [])]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT, cwd=folder)
+    done = subprocess.run(
+        command, capture_output=True, text=True, errors="replace", check=False, timeout=LIMIT, cwd=folder
+    )
     if not result.is_file():
         return f"Blender does not read it ({(done.stderr.strip().splitlines() or ['no word'])[-1][:80]})"
     with np.load(result, allow_pickle=False) as found:
