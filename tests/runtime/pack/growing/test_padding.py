@@ -9,7 +9,7 @@ import pytest
 
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.pack.config import GrowthConfig
-from flexpara.runtime.pack.growing.padding import Crowd, are_apart, padded
+from flexpara.runtime.pack.growing.padding import Crowd, are_apart, largest_factor, padded
 
 CONFIG = GrowthConfig()
 CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -51,3 +51,24 @@ def test_a_pair_is_apart_at_exactly_the_distance_asked_for() -> None:
 def test_charts_without_a_repair_left_are_refused() -> None:
     with pytest.raises(FinishError, match=r"closer than 0\.1 of the atlas side after 0 repairs"):
         padded(squares((0.25, 0.5), (0.75, 0.5), side=0.45), 0.0, 0.1, replace(CONFIG, repairs=0))
+
+
+def test_charts_whose_centres_are_too_close_are_refused_at_once() -> None:
+    with pytest.raises(FinishError, match=r"centres of charts lie closer than 0\.1 of the atlas side"):
+        padded(squares((0.5, 0.5), (0.55, 0.5), side=0.45), 0.0, 0.1, CONFIG)
+
+
+def test_pairs_that_are_no_longer_measured_change_no_bit_of_the_factor() -> None:
+    """Against halving with all pairs measured each time."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        crowd = squares(*[tuple(place) for place in rng.uniform(0.1, 0.9, (6, 2)).tolist()], side=0.2)
+        one, two = np.triu_indices(24, 1)
+        across = crowd.chart[one] != crowd.chart[two]
+        pairs = np.column_stack([one, two])[across]
+        low, high = 0.0, 1.25
+        for _ in range(40):
+            middle = (low + high) / 2.0
+            fits = are_apart(replace(crowd, factor=middle), pairs, 0.02)
+            low, high = (middle, high) if fits else (low, middle)
+        assert largest_factor(crowd, pairs, 0.02, walls=2.0) == low

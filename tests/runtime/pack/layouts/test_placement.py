@@ -87,7 +87,7 @@ def test_a_first_layout_that_jumps_as_charts_grow_still_finds_a_size() -> None:
     rng.integers(2, 8)
     outlines, area = [], 0.0
     for _ in range(7):
-        outer = np.exp(rng.normal(0.0, 0.4))
+        outer = float(np.exp(rng.normal(0.0, 0.4)))
         inner, angle = outer * rng.uniform(0.4, 0.95), rng.uniform(2.0, 5.9)
         turn = np.linspace(0.0, angle, 20)
         arc = np.column_stack([np.cos(turn), np.sin(turn)])
