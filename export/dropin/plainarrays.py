@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import colorsys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ...runtime.errors import FlexparaError, ShapeError
+from ...runtime.errors import FlexparaError, InputError, ShapeError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,27 @@ class RefusedError(FlexparaError, RuntimeError):
     """What xatlas refuses as well, with its words."""
 
 
+class WrongTypeError(FlexparaError, TypeError):
+    """What is no array, or no options."""
+
+
+def converted(name: str, values: ArrayLike, kind: type[np.generic]) -> NDArray[Any]:
+    """Values as an array of a kind, whatever numbers they are.
+
+    Raises: WrongTypeError (a TypeError).
+    """
+    try:
+        return np.asarray(values).astype(kind)
+    except (TypeError, ValueError) as error:
+        raise WrongTypeError(f"{name} array can't be read: {error}; pass an array of numbers") from error
+
+
 def rows(name: str, values: ArrayLike, columns: int, count: int | None = None) -> NDArray[np.float64]:
     """Numbers (n, columns), n = count where that is given.
 
-    Raises: ShapeError (a ValueError).
+    Raises: ShapeError (a ValueError); WrongTypeError (a TypeError).
     """
-    array = np.asarray(values).astype(np.float64)
+    array = converted(name, values, np.float64)
     if array.ndim != 2 or array.shape[1] != columns:
         raise ShapeError(f"{name} array expected to be Nx{columns}, it is {array.shape}; reshape it")
     if count is not None and len(array) != count:
@@ -42,16 +57,25 @@ def rows(name: str, values: ArrayLike, columns: int, count: int | None = None) -
 def faces_of(indices: ArrayLike, count: int) -> NDArray[np.int64]:
     """Faces (f, 3) into count vertices; without any, each three vertices in turn are one, as with xatlas.
 
-    Raises: ShapeError (a ValueError); RefusedError (a RuntimeError) for faces beyond the vertices.
+    Raises: as `triples`; RefusedError (a RuntimeError) for faces beyond the vertices.
     """
-    array = np.asarray(indices).astype(np.int64)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ShapeError(f"Index array expected to be Nx3, it is {array.shape}; reshape it")
+    array = triples(indices)
     if len(array) == 0:
         return np.arange(count // 3 * 3).reshape(-1, 3)
-    if array.min() < 0 or array.max() >= count:
+    if array.max() >= count:
         raise RefusedError(f"Adding mesh failed: Index out of range, expected 0 to {count - 1}")
     return array
+
+
+def triples(indices: ArrayLike) -> NDArray[np.int64]:
+    """Indices (f, 3) as uint32 holds them: −1 is its largest number, 2³² is 0.
+
+    Raises: ShapeError (a ValueError); WrongTypeError (a TypeError).
+    """
+    array = converted("Index", indices, np.int64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ShapeError(f"Index array expected to be Nx3, it is {array.shape}; reshape it")
+    return array % 2**32
 
 
 def drawn(meshes: list[Placed], side: int) -> NDArray[np.uint8]:
@@ -76,7 +100,9 @@ def export(
 ) -> None:
     """Write an OBJ file of positions (n, 3), faces (f, 3), uv (n, 2), v up, and normals (n, 3).
 
-    Raises: ShapeError (a ValueError); RefusedError (a RuntimeError) for faces beyond the vertices.
+    Faces beyond the vertices are written as they are, as xatlas does.
+
+    Raises: ShapeError or InputError (both ValueErrors); WrongTypeError (a TypeError).
     """
     points = rows("Position", positions, 3).astype(np.float32)
     columns = {"v": points}
@@ -88,6 +114,9 @@ def export(
     if indices is not None:
         texture, normal = "{0}" if uvs is not None else "", "/{0}" if normals is not None else ""
         corner = "{0}" if not texture and not normal else f"{{0}}/{texture}{normal}"
-        faces = (faces_of(indices, len(points)) + 1).tolist()
+        faces = (triples(indices) + 1).tolist()
         lines += [" ".join(["f", *(corner.format(place) for place in face)]) for face in faces]
-    Path(path).write_text("".join(f"{line}\n" for line in lines), encoding="ascii")
+    try:
+        Path(path).write_text("".join(f"{line}\n" for line in lines), encoding="ascii")
+    except OSError as error:
+        raise InputError(f"Cannot open path {path}: {error.strerror}; name a file in a folder that is there") from error

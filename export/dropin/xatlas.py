@@ -8,6 +8,7 @@ Options that mean nothing here are taken, and said once in the log of "flexpara.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from functools import cache, partial
@@ -19,7 +20,7 @@ from ...runtime.errors import FlexparaError, ShapeError
 from ...runtime.process.deadline import Deadline
 from .meshes import NOWHERE, Placed
 from .page import LOG, Page, Waiting, Wanted, packed_page, parts_in_time, surface_part, uv_part
-from .plainarrays import RefusedError, drawn, export, faces_of, rows
+from .plainarrays import RefusedError, WrongTypeError, drawn, export, faces_of, rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -178,14 +179,20 @@ class Atlas:
         pack_options: PackOptions | None = None,
         verbose: bool = False,
     ) -> None:
-        """Chart all meshes and pack them, within `settings.time_budget`.  verbose: say so in the log."""
+        """Chart all meshes and pack them, within `settings.time_budget`.  verbose: say so in the log.
+
+        Raises: WrongTypeError (a TypeError) for options that are none.
+        """
         chosen = pack_options or PackOptions()
-        for options in (chart_options or ChartOptions(), chosen):
+        for options, kind in ((chart_options or ChartOptions(), ChartOptions), (chosen, PackOptions)):
+            if not isinstance(options, kind):
+                raise WrongTypeError(f"options are {type(options).__name__}, expected {kind.__name__} of this module")
             _say_unused(options)
         deadline = Deadline(settings.time_budget)
         parts = parts_in_time(self._waiting, settings.time_budget)
         padding = max(int(chosen.padding), 1 if chosen.bilinear else 0)
-        wanted = Wanted(int(chosen.resolution), float(chosen.texels_per_unit), padding)
+        density = float(chosen.texels_per_unit)
+        wanted = Wanted(int(chosen.resolution), density if 0.0 < density < math.inf else 0.0, padding)
         self._page = packed_page(parts, wanted, settings.seed, deadline) if parts else None
         draws = self._page is not None and self._page.side > 0 and chosen.create_image
         self._image = drawn(self._page.meshes, self._page.side) if self._page is not None and draws else None
