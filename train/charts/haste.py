@@ -30,10 +30,15 @@ class Haste:
         """Whether layouts have to end: what has none is projected."""
         return self.config.strict and self.deadline.is_spent(self.reserve())
 
+    @property
+    def speed(self) -> float:
+        """How many times as fast as one core all of them are."""
+        return 1.0 + self.config.another * (self.cores - 1)
+
     def reserve(self) -> float:
         """Seconds for projecting, proving and packing the whole surface."""
         config = self.config
-        return config.last + (config.proving + config.projecting / self.cores) * self.faces
+        return config.last + (config.proving + config.projecting / self.speed) * self.faces
 
     def is_hopeless(self, faces: int, handles: int = 0, *, thinned: bool = True) -> bool:
         """Whether it is so late that a part would be thinned and searched, and then not half of it laid out."""
@@ -41,4 +46,4 @@ class Haste:
             return False
         thinning = self.config.thinning * faces if thinned else 0.0
         shared = self.config.laying * faces + self.config.handle * handles
-        return self.deadline.is_spent(self.reserve() + thinning + shared / self.cores)
+        return self.deadline.is_spent(self.reserve() + thinning + shared / self.speed)
