@@ -2,7 +2,8 @@
 
 Each mesh is unwrapped by flexpara at several settings (`--settings`, names of `SETTINGS`) and by the peers, each in a
 process of its own, and judged by `quality`.  Rows are kept in `results.jsonl` as they come; a rerun does what is
-missing.  At the end `results.md` has the table, `MESH.svg` a plot of seam over distortion for each mesh.
+missing, and `--for SECONDS` ends one after the row at which so many have passed.  At the end `results.md` has the
+table and what it says (`verdicts`), `MESH.svg` a plot of seam over distortion for each mesh.
 seconds: CPU seconds of the whole process for flexpara, start-up and files included; of the call alone for a peer.
 """
 
@@ -13,12 +14,14 @@ import json
 import sys
 import tempfile
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from benchmarks.corpus.__main__ import about, meshes
 from benchmarks.corpus.processes import ROOT, run
 
 from .plot import drawn
+from .verdicts import sentences
 
 Row = dict[str, Any]
 
@@ -28,6 +31,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
     "one chart, 1.025": ("--charts", "1", "--max-stretch", "1.025"),
     "auto": ("--charts", "auto"),
     "price 0.0005": ("--charts", "auto", "--seam-price", "0.0005"),
+    "price 0.0001": ("--charts", "auto", "--seam-price", "0.0001"),
     "price 0.01": ("--seam-price", "0.01"),
     **{f"charts {count}": ("--charts", str(count)) for count in (2, 4, 16, 32)},
 }
@@ -107,6 +111,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     add("--peers", default=",".join(PEERS), help="other tools; none for none")
     add("--evaluator", default=str(shared / "check" / "seamquality.py"), help="file with seam_quality(), or none")
     add("--limit", type=float, default=300.0, help="seconds a process may take")
+    add("--for", type=float, default=float("inf"), dest="seconds", help="seconds after which no row is begun")
     arguments = parser.parse_args(argv)
     asked = [name.replace(";", ",") for name in arguments.settings.split(",") if name]
     peers = [name for name in arguments.peers.split(",") if name not in ("", "none")]
@@ -119,27 +124,43 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     return arguments
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run what is missing, print the table, draw the plots; 1 where something failed."""
-    arguments = parse(argv)
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    results, facts = arguments.output / "results.jsonl", about()
-    rows = read_rows(results)
-    head = [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
-    print(f"{facts['cpu']}, {facts['cores']} cores · commit {facts['commit']}\n", *head, sep="\n", flush=True)
-    shown = []
+def rows_wanted(arguments: argparse.Namespace) -> dict[tuple[str, str], Row]:
+    """The rows that are asked for, by mesh and tool: those of earlier runs, and new ones until time is up."""
+    results, start = arguments.output / "results.jsonl", monotonic()
+    known, found = read_rows(results), {}
     for path in arguments.files:
         for tool in arguments.tools:
-            if (path.stem, tool) not in rows:
-                rows[path.stem, tool] = row_of(path, tool, arguments)
+            name = path.stem, tool
+            if name not in known:
+                if monotonic() - start > arguments.seconds:
+                    continue
+                known[name] = row_of(path, tool, arguments)
                 with results.open("a", encoding="utf-8") as stream:
-                    stream.write(json.dumps(rows[path.stem, tool]) + "\n")
-            shown.append(rows[path.stem, tool])
-            print(line(shown[-1]), flush=True)
-        points = [row for row in shown if row["mesh"] == path.stem and not row["said"]]
+                    stream.write(json.dumps(known[name]) + "\n")
+            found[name] = known[name]
+            print(line(found[name]), flush=True)
+    return found
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run what is missing, print the table, draw the plots; 1 where something failed, 3 where rows are missing."""
+    arguments = parse(argv)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    facts = about()
+    head = [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
+    print(f"{facts['cpu']}, {facts['cores']} cores · commit {facts['commit']}\n", *head, sep="\n", flush=True)
+    rows, said = rows_wanted(arguments), list[str]()
+    for path in arguments.files:
+        own = [row for (mesh, _), row in rows.items() if mesh == path.stem]
+        said += sentences(path.stem, own, PEERS)
+        points = [row for row in own if not row["said"]]
         (arguments.output / f"{path.stem}.svg").write_text(drawn(path.stem, points), encoding="utf-8")
-    (arguments.output / "results.md").write_text("\n".join([*head, *map(line, shown), ""]), encoding="utf-8")
-    return 1 if any(row["said"] for row in shown) else 0
+    print("", *said, sep="\n")
+    table = [*head, *map(line, rows.values()), "", *said, ""]
+    (arguments.output / "results.md").write_text("\n".join(table), encoding="utf-8")
+    if any(row["said"] for row in rows.values()):
+        return 1
+    return 3 if len(rows) < len(arguments.files) * len(arguments.tools) else 0
 
 
 if __name__ == "__main__":

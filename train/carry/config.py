@@ -21,8 +21,11 @@ class CarryConfig:
     """Mean excess energy added to that."""
     islet: float = 0.001
     """Share of a part below which a fragment of a label joins a neighbour."""
-    winding: float = 1.4
-    """Length of a seam, as a multiple of its ends' distance, above which it is led along in parts."""
+    winding: tuple[float, ...] = (1.4, 2.0, 4.0)
+    """Length of a seam, as a multiple of its ends' distance, above which it is led along in parts; the next, which
+    leaves it more freedom, where it can't be led like that, or pieces lie over themselves then."""
+    candidates: int = 4
+    """Vertices near a junction of the proxy of which one is to be its place."""
     rigid_steps: int = 4
     """Steps of as-rigid-as-possible flattening from the proxy's rotations."""
     hurried_rounds: int = 8

@@ -28,11 +28,14 @@ if TYPE_CHECKING:
     from ..finish.flaps import Trimmed
 
 
-def network_carried(surface: Surface, found: Search) -> Search | None:
-    """The pieces of the proxy on the surface; None where its seams can't all be led there, or a piece is not valid."""
+def network_carried(surface: Surface, found: Search, winding: float) -> Search | None:
+    """The pieces of the proxy on the surface; None where its seams can't all be led there, or a piece is not valid.
+
+    winding: length of a seam, as a multiple of its ends' distance, above which it is led along in parts.
+    """
     graph = dual_graph(surface, edge_table(surface.faces), found.config.labels.seams)
     search = Search(surface, graph, found.config)
-    seam = carried_seams(search, found)
+    seam = carried_seams(search, found, winding)
     if seam is None:
         return None
     pairs = search.table.edge_faces[search.table.manifold & ~seam]
@@ -57,9 +60,9 @@ def network_carried(surface: Surface, found: Search) -> Search | None:
     return search
 
 
-def carried_seams(search: Search, found: Search) -> NDArray[np.bool_] | None:
+def carried_seams(search: Search, found: Search, winding: float) -> NDArray[np.bool_] | None:
     """(e,) bool: the seams of the proxy's search on the surface of another; None where one finds no way."""
-    points, winding = found.surface.vertices, found.config.carry.winding
+    points = found.surface.vertices
     ways = [part for chain in chains(found, seam_edges(found)) for part in stretches(chain.path, points, winding)]
     place = places(search, found, sorted({int(end) for way in ways for end in (way[0], way[-1])}))
     if place is None:
@@ -98,7 +101,7 @@ def stretches(path: NDArray[np.int64], points: NDArray[np.float64], winding: flo
 
 
 def places(search: Search, found: Search, nodes: list[int]) -> dict[int, int] | None:
-    """The vertex nearest to each node of the proxy, on the border for one on its border; None where two share one."""
+    """A vertex near each node of the proxy, on the border for one on its border; None where there are too few."""
     sides = []
     for table, surface in ((found.table, found.surface), (search.table, search.surface)):
         border = np.zeros(len(surface.vertices), dtype=bool)
@@ -111,6 +114,19 @@ def places(search: Search, found: Search, nodes: list[int]) -> dict[int, int] | 
         if mine and not len(theirs):
             return None
         if mine:
-            near = theirs[KDTree(search.surface.vertices[theirs]).query(found.surface.vertices[mine])[1]]
-            place |= dict(zip(mine, near.tolist(), strict=True))
-    return place if len(set(place.values())) == len(place) else None
+            count = min(found.config.carry.candidates, len(theirs))
+            distance, near = KDTree(search.surface.vertices[theirs]).query(found.surface.vertices[mine], k=count)
+            shape = len(mine), count
+            place |= shared_out(mine, theirs[near].reshape(shape), np.reshape(distance, shape))
+    return place if len(place) == len(nodes) else None
+
+
+def shared_out(nodes: list[int], near: NDArray[np.int64], distance: NDArray[np.float64]) -> dict[int, int]:
+    """A vertex of those near (n, c) for each node, none twice, by least distance (n, c) first; some may be left out."""
+    place, taken = dict[int, int](), set[int]()
+    for at in np.argsort(distance, axis=None, kind="stable").tolist():
+        node, vertex = nodes[at // near.shape[1]], int(near.flat[at])
+        if node not in place and vertex not in taken:
+            place[node] = vertex
+            taken.add(vertex)
+    return place

@@ -239,11 +239,15 @@ def brought_back(
     charts, config = page.most, starts.config
     if late() and coarse is not surface:
         return refined(surface, coarse, list(found.pieces.values()), config, late, last)
+    ways = [found]
     if coarse is not middle:
-        found = (back_on if asked else carried_back)(middle, coarse, found, charts, config)
-    if not late():
-        found = straightened(found, config.bands_carried) if coarse is not middle else found
-        found = settled(found, charts, config, late)
+        labels = [] if asked else [carried_back(middle, coarse, found, charts, config)]
+        ways = labels or back_on(middle, coarse, found, charts, config)
+    if late():
+        found = ways[0]
+    else:
+        ways = [straightened(way, config.bands_carried) for way in ways] if coarse is not middle else ways
+        found = settled(ways, charts, config, late)
     found.mend()
     pieces = list(found.pieces.values())
     if starts.carried and not (config.stretch or late()):

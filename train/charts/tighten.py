@@ -55,14 +55,15 @@ def spent_fine(search: Search, charts: int, config: FinishConfig, late: Late = n
     return spent(search, Bounds(charts, config.stretch), config, config.closing.tries_fine, late)
 
 
-def settled(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
-    """The search on the surface itself with slits that pay, straight arcs, and its stretch spent if asked for.
+def settled(searches: list[Search], charts: int, config: FinishConfig, late: Late = never) -> Search:
+    """The best search on the surface itself with slits that pay, straight arcs, and its stretch spent if asked for.
 
     Under a bound on stretch a slit may be a detour, or the room that two seams are closed in: both ways are gone.
     """
-    ways = (True, False) if 0.0 < search.energy() <= config.stretch else (True,)
-    found = parallel_map(lambda slits: settled_way(search, charts, config, late, slits=slits), ways)
-    return min(found, key=lambda each: rank(list(each.pieces.values()), each.surface, charts, config))
+    ways = [(search, True) for search in searches]
+    ways += [(search, False) for search in searches if 0.0 < search.energy() <= config.stretch]
+    found = parallel_map(lambda way: settled_way(way[0], charts, config, late, slits=way[1]), ways)
+    return min(found, key=lambda search: place_of(search, charts))
 
 
 def settled_way(search: Search, charts: int, config: FinishConfig, late: Late, *, slits: bool) -> Search:
@@ -79,19 +80,33 @@ def settled_way(search: Search, charts: int, config: FinishConfig, late: Late, *
 
 def with_straight_seams(search: Search) -> Search:
     """The search with each seam on the cheapest way between its ends, where that lowers the objective."""
-    found = network_carried(search.surface, search)
+    found = network_carried(search.surface, search, search.config.carry.winding[0])
     return found if found is not None and found.objective() < search.objective() else search
 
 
-def back_on(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> Search:
-    """The search of a proxy on the surface: its seams as a network, or its labels where that comes out better."""
-    network = network_carried(surface, found)
+def back_on(surface: Surface, coarse: Surface, found: Search, charts: int, config: FinishConfig) -> list[Search]:
+    """The search of a proxy on the surface: its seams as a network, or its labels where that comes out better.
+
+    Where the best of these has too many charts, the best of the others is the second: its stretch may be opened up.
+    """
     most = max(charts, len(found.pieces))
-    if network is not None and len(network.pieces) <= most and network.objective() <= found.objective():
-        return network
-    labels = carried_back(surface, coarse, found, charts, config)
-    ways = [labels] if network is None else [network, labels]
-    return min(ways, key=lambda search: rank(list(search.pieces.values()), surface, most, config))
+    ways: list[Search] = []
+    for winding in config.carry.winding:
+        network = network_carried(surface, found, winding)
+        if network is not None:
+            ways.append(network)
+        if network is not None and len(network.pieces) <= most:
+            if network.objective() <= found.objective():
+                return [network]
+            break
+    ways = sorted([*ways, carried_back(surface, coarse, found, charts, config)], key=lambda way: place_of(way, most))
+    few = [way for way in ways if len(way.pieces) <= most]
+    return [*dict.fromkeys((ways[0], *few[:1]))]
+
+
+def place_of(search: Search, charts: int) -> tuple[bool, bool, float]:
+    """The rank of a search."""
+    return rank(list(search.pieces.values()), search.surface, charts, search.config)
 
 
 def opened_up(search: Search, excess: float, config: FinishConfig, late: Late = never) -> None:

@@ -11,7 +11,7 @@ from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pai
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.carry.network import network_carried, stretches
+from flexpara.train.carry.network import network_carried, shared_out, stretches
 from flexpara.train.config import FinishConfig
 from flexpara.train.seams.closing import Bounds, Closing
 from flexpara.train.seams.config import ClosingConfig
@@ -109,7 +109,7 @@ def test_closing_stops_at_the_bound_on_stretch() -> None:
 
 def test_seams_are_carried_as_a_network_to_a_finer_mesh_with_as_many_charts() -> None:
     coarse, fine = halved(sheet(bend=2.0)), sheet(12, 24, bend=2.0)
-    found = network_carried(fine, coarse)
+    found = network_carried(fine, coarse, 1.4)
     assert found is not None
     assert len(found.pieces) == 2
     assert found.energy() < 1e-3
@@ -123,3 +123,9 @@ def test_a_winding_way_is_led_along_in_parts_and_a_straight_one_as_a_whole() -> 
     parts = stretches(path, points, 1.4)
     assert [part.tolist() for part in parts] == [[0, 1, 2, 3, 4], [4, 5, 6, 7, 8]]
     assert len(stretches(path[:3], points, 1.4)) == 1
+
+
+def test_two_junctions_near_one_vertex_get_two() -> None:
+    near = np.array([[5, 7], [5, 9]])
+    assert shared_out([0, 1], near, np.array([[0.2, 0.3], [0.1, 0.4]])) == {1: 5, 0: 7}
+    assert shared_out([0, 1], near[:, :1], np.array([[0.2], [0.1]])) == {1: 5}

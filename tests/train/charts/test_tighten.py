@@ -1,0 +1,70 @@
+"""Charts of the proxy led back to the surface: one way after the other, and few charts are not given up for stretch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("igl")
+
+from flexpara.runtime.geometry.topology import edge_table
+from flexpara.runtime.mesh import Surface
+from flexpara.runtime.samples import make_sample
+from flexpara.train.charts import tighten
+from flexpara.train.charts.tighten import back_on
+from flexpara.train.config import FinishConfig
+from flexpara.train.search.labels import dual_graph
+from flexpara.train.search.search import Search
+
+CONFIG = FinishConfig(stretch=0.02)
+
+
+def bowl(charts: int, energy: float = 0.01) -> Search:
+    """A half sphere of area 1 in so many sectors, and a mean stretch to be told them by."""
+    whole = Surface(*make_sample("sphere", resolution=16))
+    faces = whole.faces[whole.triangles.mean(axis=1)[:, 2] > 0.0]
+    used, index = np.unique(faces, return_inverse=True)
+    part = Surface(whole.vertices[used], index.reshape(-1, 3))
+    surface = Surface(part.vertices / np.sqrt(part.face_areas().sum()), part.faces)
+    x, y, _ = surface.triangles.mean(axis=1).T
+    label = ((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * charts).astype(np.int64)
+    search = Search(surface, dual_graph(surface, edge_table(surface.faces), CONFIG.labels.seams), CONFIG)
+    search.add_all_valid([(np.flatnonzero(label == value), ()) for value in range(charts)])
+    search.pieces = {key: replace(piece, energy=energy / charts) for key, piece in search.pieces.items()}
+    return search
+
+
+@pytest.fixture
+def led(monkeypatch: pytest.MonkeyPatch) -> dict[float, Search | None]:
+    """What comes of seams led back, by the freedom that they have; labels come back as four charts."""
+    ways: dict[float, Search | None] = {}
+    monkeypatch.setattr(tighten, "network_carried", lambda _surface, _found, winding: ways[winding])
+    monkeypatch.setattr(tighten, "carried_back", lambda *_: bowl(4))
+    return ways
+
+
+def counts(found: Search, charts: int) -> list[int]:
+    return [len(way.pieces) for way in back_on(found.surface, found.surface, found, charts, CONFIG)]
+
+
+def test_seams_that_can_t_be_led_strictly_get_more_freedom(led: dict[float, Search | None]) -> None:
+    first, second, third = CONFIG.carry.winding
+    found = bowl(1)
+    led |= {first: None, second: bowl(1)}
+    assert third not in led
+    assert counts(found, 1) == [1]
+
+
+def test_of_ways_of_many_charts_and_of_much_stretch_both_are_settled(led: dict[float, Search | None]) -> None:
+    found, one = bowl(1), bowl(1, energy=2.0 * CONFIG.stretch)
+    led |= dict(zip(CONFIG.carry.winding, (bowl(3), bowl(2), one), strict=True))
+    best, few = counts(found, 1)
+    assert best > 1
+    assert few == 1
+
+
+def test_where_no_way_can_be_led_labels_are_what_is_left(led: dict[float, Search | None]) -> None:
+    led |= dict.fromkeys(CONFIG.carry.winding)
+    assert counts(bowl(1), 1) == [4]
