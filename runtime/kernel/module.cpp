@@ -74,11 +74,11 @@ static Rows rows_of(const py::object& matrix) {
 
 static void define_solvers(py::module_& module) {
     py::class_<TwoLevel>(module, "TwoLevel")
-        .def(py::init([](const py::object& matrix, const py::object& weights, const py::object& coarse,
-                         double tolerance, int most, int threads) {
-            const Rows all = rows_of(matrix), shares = rows_of(weights), few = rows_of(coarse);
+        .def(py::init([](const py::object& matrix, const py::object& weights, double tolerance, int most, int threads) {
+            const Rows all = rows_of(matrix), shares = rows_of(weights);
+            const int coarse = weights.attr("shape").cast<std::pair<int, int>>().second;
             py::gil_scoped_release free;
-            return TwoLevel(all, shares, few, tolerance, most, threads);
+            return TwoLevel(all, shares, coarse, tolerance, most, threads);
         }))
         .def("solve", [](const TwoLevel& solver, const Numbers& right, const Numbers& start, double size) {
             TwoLevel::Pairs wanted(right.shape(0)), found(right.shape(0));
@@ -289,7 +289,7 @@ static void define_clouds(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 4;
+    module.attr("edition") = 5;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);

@@ -30,20 +30,19 @@ class TwoLevel:
         self.matrix, self.coarse, self.tolerance, self.most = matrix, coarse, tolerance, most
         self.scale = np.reciprocal(np.asarray(matrix.diagonal(), dtype=np.float64))[:, None]
         self.transposed = sparse.csr_array(coarse.T)
-        self.small = sparse.csr_array(self.transposed @ matrix @ coarse)
 
     @cached_property
     def solver(self) -> SuperLU:
         """Of the coarse level."""
-        return factorize(self.small)
+        return factorize(sparse.csr_array(self.transposed @ self.matrix @ self.coarse))
 
     @cached_property
     def compiled(self) -> Any | None:
-        """The same by the kernel, for two columns."""
+        """The same by the kernel, for two columns; with levels in between where the coarse level has few unknowns."""
         compiled = kernel()
         if compiled is None:
             return None
-        return compiled.TwoLevel(self.matrix, self.coarse, self.small, self.tolerance, self.most, core_count())
+        return compiled.TwoLevel(self.matrix, self.coarse, self.tolerance, self.most, core_count())
 
     def solve(self, right: NDArray[np.float64], start: NDArray[np.float64] | None, size: float) -> NDArray[np.float64]:
         """X (n, c) for right sides (n, c), from ``start``: each column by itself, all at once; size: of residuals."""

@@ -108,3 +108,17 @@ def test_rows_that_pull_at_others_of_another_block_do_not_end_it() -> None:
     right = np.random.default_rng(5).normal(size=(3 * count + 1, 2))
     found = TwoLevel(matrix, sparse.csr_array(np.ones((3 * count + 1, 1))), 1e-10, 500).solve(right, None, 1.0)
     assert np.linalg.norm(right - matrix @ found) <= 1e-9
+
+
+def test_levels_between_keep_the_steps_few_where_the_coarse_level_has_few_unknowns() -> None:
+    if kernel() is None:
+        pytest.skip("nothing was compiled")
+    side, spacing = 241, 20
+    line, whole = chain(side), sparse.eye_array(side)
+    matrix = sparse.csr_array(sparse.kron(line, whole) + sparse.kron(whole, line))
+    coarse = sparse.csr_array(sparse.kron(*[hats(side, spacing)[:, :-1]] * 2))
+    exact = np.random.default_rng(6).normal(size=(side * side, 2)).cumsum(axis=0)
+    right = matrix @ exact
+    size = float(np.linalg.norm(right))
+    found = TwoLevel(matrix, coarse, 1e-9, 16).solve(right, None, size)
+    assert np.linalg.norm(right - matrix @ found) <= 1e-5 * size
