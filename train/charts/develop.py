@@ -56,9 +56,10 @@ class Development:
 
 
 class Hinge(NamedTuple):
-    """How a second development joins a first: its uv once moved (m, 3, 2), and the edges (h,) that then coincide."""
+    """How a second development joins a first: turn (2, 2), shift (2,) of its uv; the edges (h,) that then coincide."""
 
-    uv: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    shift: NDArray[np.float64]
     edges: NDArray[np.int64]
     length: float
 
@@ -120,11 +121,15 @@ class Unfolding:
             left &= ~meeting
             left[at] = False
             joined = edges[meeting]
-            yield Hinge(self.members[second].uv @ turn.T + shift, joined, float(self.length[joined].sum()))
+            yield Hinge(turn, shift, joined, float(self.length[joined].sum()))
+
+    def shorter_border(self, first: int, second: int) -> float:
+        """The perimeter of the one that has less of it."""
+        return max(min(self.members[first].perimeter, self.members[second].perimeter), 1e-300)
 
     def best_hinge(self, first: int, second: int, edges: NDArray[np.int64]) -> tuple[float, Hinge]:
         """The way that joins the greatest share of the shorter border: (share, hinge)."""
-        shorter = max(min(self.members[first].perimeter, self.members[second].perimeter), 1e-300)
+        shorter = self.shorter_border(first, second)
         hinge = max(
             self.hinges(first, second, edges), key=lambda hinge: round(hinge.length / shorter, self.config.digits)
         )
@@ -137,7 +142,7 @@ class Unfolding:
     def joined(self, first: int, second: int, hinge: Hinge) -> Development | None:
         """Both as one development; None where it would overlap itself or sprawl."""
         a, b = self.members[first], self.members[second]
-        uv = self._welded(a, b.ids, hinge)
+        uv = self._welded(a, b, hinge)
         ids, both = np.concatenate([a.ids, b.ids]), np.concatenate([a.uv, uv])
         order = np.argsort(ids)
         whole = Development(ids[order], both[order], a.perimeter + b.perimeter - 2.0 * hinge.length)
@@ -153,9 +158,10 @@ class Unfolding:
         least = min(self.config.fill, a.fill * 0.999, b.fill * 0.999)  # slender triangles fill half of theirs
         return whole.fill >= least and (along or short or whole.aspect <= longest)
 
-    def _welded(self, a: Development, ids: NDArray[np.int64], hinge: Hinge) -> NDArray[np.float64]:
-        """The moved uv with the ends of joined edges exactly where the first development has them."""
-        uv = hinge.uv.copy()
+    def _welded(self, a: Development, b: Development, hinge: Hinge) -> NDArray[np.float64]:
+        """The moved uv of b with the ends of joined edges exactly where the first development has them."""
+        ids, moved = b.ids, b.uv @ hinge.turn.T + hinge.shift
+        uv = moved.copy()
         for edge in hinge.edges.tolist():
             face = self.table.edge_faces[edge]
             row = np.searchsorted(a.ids, face)
@@ -164,8 +170,8 @@ class Unfolding:
             for vertex in self.table.edges[edge].tolist():
                 place = a.uv[np.searchsorted(a.ids, kept), np.flatnonzero(self.surface.faces[kept] == vertex)[0]]
                 corner = np.flatnonzero(self.surface.faces[other] == vertex)[0]
-                before = hinge.uv[np.searchsorted(ids, other), corner]
-                same = (self.surface.faces[ids] == vertex) & (np.abs(hinge.uv - before).max(axis=2) <= self.tolerance)
+                before = moved[np.searchsorted(ids, other), corner]
+                same = (self.surface.faces[ids] == vertex) & (np.abs(moved - before).max(axis=2) <= self.tolerance)
                 uv[same] = place
         return uv
 
@@ -194,11 +200,15 @@ def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config
     around: dict[int, dict[int, NDArray[np.int64]]] = {number: {} for number in state.members}
     for (a, b), edges in state.shared_edges().items():
         around[a][b] = around[b][a] = edges
-    queue = [entry for a, beside in around.items() for b in beside if a < b and (entry := ranked(state, a, b, around))]
+    queue = [entry for a, beside in around.items() for b in beside if a < b and (entry := hoped(state, a, b, around))]
     heapify(queue)
     while queue:
-        _, first, second = heappop(queue)
+        _, first, second, is_exact = heappop(queue)
         if first not in state.members or second not in state.members:
+            continue
+        if not is_exact:
+            if entry := ranked(state, first, second, around):
+                heappush(queue, entry)
             continue
         edges = around[first][second]
         joined = state.joined(first, second, state.best_hinge(first, second, edges)[1])
@@ -207,18 +217,33 @@ def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config
         number = state.replace(first, second, joined)
         around[number] = combined(around, first, second, number)
         for other in around[number]:
-            if entry := ranked(state, other, number, around):
+            if entry := hoped(state, other, number, around):
                 heappush(queue, entry)
     return sorted(state.members.values(), key=lambda found: int(found.ids[0]))
 
 
+def hoped(
+    state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
+) -> tuple[float, int, int, bool] | None:
+    """As ranked, if all edges between the two could be joined: the share is found once that is the greatest hope.
+
+    Most pairs end before, as one of the two joins another.
+    """
+    edges = around[first][second]
+    most = float(state.length[edges].sum()) * (1.0 + 1e-9)
+    share = most / state.shorter_border(first, second)
+    ends = state.config.whole_end * max(state.members[each].box[1] for each in (first, second))
+    enough = share >= state.config.shared or most >= ends
+    return (-round(share, state.config.digits), first, second, False) if enough else None
+
+
 def ranked(
     state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
-) -> tuple[float, int, int] | None:
-    """(−share of the shorter border, pair) of two developments that share enough of it, else None."""
+) -> tuple[float, int, int, bool] | None:
+    """(−share of the shorter border, pair, True) of two developments that share enough of it, else None."""
     share, hinge = state.best_hinge(first, second, around[first][second])
     enough = share >= state.config.shared or state.rolls_on(first, second, hinge)
-    return (-round(share, state.config.digits), first, second) if enough else None
+    return (-round(share, state.config.digits), first, second, True) if enough else None
 
 
 def combined(
