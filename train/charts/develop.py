@@ -202,16 +202,17 @@ def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config
         around[a][b] = around[b][a] = edges
     queue = [entry for a, beside in around.items() for b in beside if a < b and (entry := hoped(state, a, b, around))]
     heapify(queue)
+    ways = dict[tuple[int, int], Hinge]()
     while queue:
         _, first, second, is_exact = heappop(queue)
         if first not in state.members or second not in state.members:
             continue
         if not is_exact:
-            if entry := ranked(state, first, second, around):
-                heappush(queue, entry)
+            share, ways[first, second] = state.best_hinge(first, second, around[first][second])
+            if share >= config.shared or state.rolls_on(first, second, ways[first, second]):
+                heappush(queue, (-round(share, config.digits), first, second, True))
             continue
-        edges = around[first][second]
-        joined = state.joined(first, second, state.best_hinge(first, second, edges)[1])
+        joined = state.joined(first, second, ways.pop((first, second)))
         if joined is None:
             continue
         number = state.replace(first, second, joined)
@@ -225,9 +226,9 @@ def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config
 def hoped(
     state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
 ) -> tuple[float, int, int, bool] | None:
-    """As ranked, if all edges between the two could be joined: the share is found once that is the greatest hope.
+    """(−share of the shorter border, pair, False) if all edges between the two could be joined; None if too little.
 
-    Most pairs end before, as one of the two joins another.
+    The share itself is found once that is the greatest hope: most pairs end before, as one of the two joins another.
     """
     edges = around[first][second]
     most = float(state.length[edges].sum()) * (1.0 + 1e-9)
@@ -235,15 +236,6 @@ def hoped(
     ends = state.config.whole_end * max(state.members[each].box[1] for each in (first, second))
     enough = share >= state.config.shared or most >= ends
     return (-round(share, state.config.digits), first, second, False) if enough else None
-
-
-def ranked(
-    state: Unfolding, first: int, second: int, around: dict[int, dict[int, NDArray[np.int64]]]
-) -> tuple[float, int, int, bool] | None:
-    """(−share of the shorter border, pair, True) of two developments that share enough of it, else None."""
-    share, hinge = state.best_hinge(first, second, around[first][second])
-    enough = share >= state.config.shared or state.rolls_on(first, second, hinge)
-    return (-round(share, state.config.digits), first, second, True) if enough else None
 
 
 def combined(
