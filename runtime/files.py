@@ -222,13 +222,14 @@ def replace_file(path: Path, content: bytes) -> None:
     Written beside its place, on the disk before it is renamed: a process killed at any moment leaves the old content
     or the new one.
 
-    Raises: OSError where that can't be done; nothing is left behind.
+    Raises: DiskFullError; OSError where that can't be done for another reason.  Nothing is left behind.
     """
     partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_bytes(content)
-        _reach_disk(partial)
-        partial.replace(path)
+        with disk_full_is_said(path.parent):
+            partial.write_bytes(content)
+            _reach_disk(partial)
+            partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flexpara.runtime.errors import ForeignFileError, InputError
+from flexpara.runtime.errors import DiskFullError, ForeignFileError, InputError
 from flexpara.runtime.files import OutputFolder, replace_file, write_whole
 
 
@@ -226,7 +226,7 @@ def test_a_file_of_ours_is_replaced_whole_or_stays(tmp_path: Path, monkeypatch: 
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("flexpara.runtime.files.os.fsync", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(DiskFullError, match=r"disk of .* is full"):
         replace_file(path, b"three")
     assert path.read_bytes() == b"two"
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
