@@ -37,13 +37,15 @@ MOVEMENT = ("Cast", "Concat", "Constant", "Expand", "Gather", "GatherElements", 
 MOVEMENT += ("ScatterElements", "ScatterND", "Shape", "Slice", "Split", "Squeeze", "Transpose", "Unsqueeze")
 OWN_OPERATORS = frozenset((*ARITHMETIC, *CHOICE, *REDUCTION, *MOVEMENT))
 """Operators of the files that flexpara writes or has written."""
+VARIADIC = frozenset((b"Concat", b"Einsum", b"Max", b"Mean", b"Min", b"Sum"))
+"""Operators of any number of inputs: ONNX Runtime 1.31 falls over where one of them has no name."""
 DOMAINS = (b"", b"ai.onnx")
 MOST_NODES = 200_000
 DEEPEST = 8
 """Graphs inside of nodes inside of graphs."""
 GRAPH, OPSETS, TRAINING, FUNCTIONS = 7, 8, 20, 25
 NODE, INITIALIZER, SPARSE = 1, 5, 15
-OPERATOR, ATTRIBUTE, DOMAIN = 4, 5, 7
+INPUT, OPERATOR, ATTRIBUTE, DOMAIN = 1, 4, 5, 7
 TENSOR, SUBGRAPH, TENSORS, SUBGRAPHS, SPARSE_ATTRIBUTE, SPARSE_ATTRIBUTES = 5, 6, 10, 11, 22, 23
 EXTERNAL, LOCATION = 13, 14
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
@@ -106,6 +108,7 @@ def _check_graph(graph: Message, name: str, operators: frozenset[str] | None, de
 def _check_node(node: Message, name: str, operators: frozenset[str] | None, depth: int) -> int:
     """How many nodes lie in its graphs."""
     _check_domain(node, DOMAIN, name)
+    _check_inputs(node, name)
     inside = 0
     for field, value in fields(node):
         if field == OPERATOR and operators is not None and bytes(_message(value)).decode("latin-1") not in operators:
@@ -123,6 +126,15 @@ def _check_node(node: Message, name: str, operators: frozenset[str] | None, dept
                     raise BundleError(f"{name}: a node holds a graph, which flexpara never writes; {_REMEDY}")
                 inside += _check_graph(_message(part), name, operators, depth + 1)
     return inside
+
+
+def _check_inputs(node: Message, name: str) -> None:
+    """Refuse a node of any number of inputs of which one is left out."""
+    parts = [(field, bytes(_message(value))) for field, value in fields(node) if field in (INPUT, OPERATOR)]
+    operator = next((value for field, value in parts if field == OPERATOR), b"")
+    if operator in VARIADIC and (INPUT, b"") in parts:
+        found = operator.decode("ascii")
+        raise BundleError(f"{name}: an input of a node {found} has no name, expected all of them; {_REMEDY}")
 
 
 def _check_domain(holder: Message | int, field: int, name: str) -> None:

@@ -14,7 +14,7 @@ def check_archive(data: bytes) -> None:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
-    except zipfile.BadZipFile as error:
+    except (zipfile.BadZipFile, NotImplementedError) as error:  # the latter: of a version that there is not yet
         raise MeshError("the file is no zip archive, as its format asks; export it again") from error
     most = limits()
     most.demand_unpacked(size, len(data), "the archive")

@@ -40,7 +40,8 @@ class Placement:
     def unlikeness(self) -> tuple[bool, int]:
         """Whether it mirrors, and how unevenly it scales in steps of `UNEVEN`: what unwraps best has the least."""
         scales = np.linalg.svd(self.world[:3, :3], compute_uv=False)
-        spread = float(scales[0] / max(scales[2], np.finfo(np.float64).tiny))
+        with np.errstate(over="ignore"):  # beyond all numbers is uneven enough
+            spread = float(scales[0] / max(scales[2], np.finfo(np.float64).tiny))
         return bool(np.linalg.det(self.world[:3, :3]) < 0.0), round(min(np.log(spread), 100.0) / UNEVEN)
 
 

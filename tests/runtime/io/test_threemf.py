@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from flexpara.runtime.errors import MeshError
+from flexpara.runtime.io.formats.archive import check_archive
 from flexpara.runtime.io.formats.threemf import read_3mf
 from flexpara.runtime.io.rawmesh import RawMesh
 
@@ -128,3 +129,13 @@ def test_damage_is_named_in_one_line(text: str, message: str) -> None:
 def test_what_is_no_archive_is_refused() -> None:
     with pytest.raises(MeshError, match="no zip archive"):
         read_3mf(b"PK")
+
+
+def test_an_archive_of_a_version_that_there_is_not_yet_is_refused() -> None:
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        archive.writestr("3D/3dmodel.model", "")
+    newer = bytearray(data.getvalue())
+    newer[newer.index(b"PK\x01\x02") + 6] = 148
+    with pytest.raises(MeshError, match="no zip archive"):
+        check_archive(bytes(newer))

@@ -53,7 +53,12 @@ def external_in_a_node(made: onnx.ModelProto) -> None:
     made.graph.node[0].attribute.append(onnx.helper.make_attribute("value", tensor))
 
 
+def nameless_input(made: onnx.ModelProto) -> None:
+    made.graph.node.append(onnx.helper.make_node("Min", ["x", ""], ["least"]))
+
+
 REFUSED = {
+    nameless_input: "input of a node Min has no name",
     other_operator: "operator 'Loop'",
     other_domain: "domain 'com.evil'",
     imported_domain: "domain 'com.microsoft'",
