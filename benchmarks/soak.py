@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from ctypes import CDLL
+from ctypes import CDLL, byref, c_uint
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
@@ -33,9 +33,18 @@ NEAR = 10
 FLAT = 1.05
 """How much more memory there may be at the end."""
 
-KINDS = ("Buffer", "Framebuffer", "Program", "Query", "Renderbuffer", "Sampler", "Shader", "Texture", "VertexArray")
-NAMES = range(1, 1024)
-"""Of OpenGL objects: a device gives the lowest that is free."""
+GENERATED = {
+    "Buffer": "Buffers",
+    "Framebuffer": "Framebuffers",
+    "Query": "Queries",
+    "Renderbuffer": "Renderbuffers",
+    "Sampler": "Samplers",
+    "Texture": "Textures",
+    "VertexArray": "VertexArrays",
+}
+"""Kinds of OpenGL objects, as in `glIsQuery` and `glGenQueries`; programs and shaders are made by `glCreateProgram`."""
+NAMES = 1024
+"""So many of each kind are asked for at the least: some devices give the lowest that is free, others never one twice."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +73,23 @@ def opengl_objects() -> int:
     count = len(idle.contexts)
     for context in idle.contexts:
         with context:
-            count += sum(getattr(library, f"glIs{kind}")(name) & 1 for kind in KINDS for name in NAMES)
+            for kind, last in _last_names(library).items():
+                held = getattr(library, f"glIs{kind}")
+                count += sum(held(name) & 1 for name in range(1, max(last, NAMES) + 1))
     return count
+
+
+def _last_names(library: CDLL) -> dict[str, int]:
+    """Of each kind of object, the name that a new one gets: it is made for that, and given back."""
+    found = {}
+    for kind, kinds in GENERATED.items():
+        name = c_uint()
+        getattr(library, f"glGen{kinds}")(1, byref(name))
+        getattr(library, f"glDelete{kinds}")(1, byref(name))
+        found[kind] = name.value
+    program = library.glCreateProgram()
+    library.glDeleteProgram(program)
+    return {**found, "Program": program, "Shader": program}  # which share their names
 
 
 def rounds(kind: str, count: int, work: Callable[[], object], record: Path) -> list[Reading]:
