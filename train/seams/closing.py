@@ -92,15 +92,14 @@ class Closing:
             if self.take_best(paying, seam, price):
                 continue
             many = len(self.search.pieces) > self.bounds.charts
-            bridges = sorted((run for run in runs if len(run.sides) == 2), key=lambda run: run.saved)
+            bridges = self.within_bounds(sorted((run for run in runs if len(run.sides) == 2), key=lambda run: run.saved))
             if not many or not bridges:
                 return
             self.take_best(bridges, seam, np.inf)
 
     def take_best(self, runs: list[Run], seam: NDArray[np.bool_], price: float) -> bool:
         """Close the best of the first runs that pays at this price; False where none does."""
-        room = self.bounds.excess - self.search.energy()
-        worth = [run for run in runs if run.paid < room + self.config.doubt][: self.config.patience]
+        worth = self.within_bounds(runs)[: self.config.patience]
         for at in range(0, len(worth), self.config.looks):
             block = worth[at : at + self.config.looks]
             self.flatten(block, seam)
@@ -109,6 +108,11 @@ class Closing:
                     return True
                 self.vain.add(run.place)
         return False
+
+    def within_bounds(self, runs: list[Run]) -> list[Run]:
+        """Those of the runs that are foretold to leave the stretch within bounds."""
+        room = self.bounds.excess - self.search.energy()
+        return [run for run in runs if run.paid < room + self.config.doubt]
 
     def flatten(self, runs: list[Run], seam: NDArray[np.bool_]) -> None:
         """Flatten what is left by closing each of these runs, those that are new."""

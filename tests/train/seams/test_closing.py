@@ -107,6 +107,12 @@ def test_closing_stops_at_the_bound_on_stretch() -> None:
     assert search.energy() <= bound
 
 
+def test_closing_ends_where_too_many_charts_are_left_and_each_bridge_is_foretold_to_stretch_too_much() -> None:
+    search = octants()
+    Closing(search, Bounds(1, search.energy() - 1.0), ClosingConfig()).close(search.price, 12)
+    assert len(search.pieces) == 8
+
+
 def test_seams_are_carried_as_a_network_to_a_finer_mesh_with_as_many_charts() -> None:
     coarse, fine = halved(sheet(bend=2.0)), sheet(12, 24, bend=2.0)
     found = network_carried(fine, coarse, 1.4)
