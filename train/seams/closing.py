@@ -92,10 +92,10 @@ class Closing:
             if self.take_best(paying, seam, price):
                 continue
             many = len(self.search.pieces) > self.bounds.charts
-            bridges = self.within_bounds(sorted((run for run in runs if len(run.sides) == 2), key=lambda run: run.saved))
+            bridges = self.within_bounds([run for run in runs if len(run.sides) == 2])
             if not many or not bridges:
                 return
-            self.take_best(bridges, seam, np.inf)
+            self.take_best(sorted(bridges, key=lambda run: run.saved), seam, np.inf)
 
     def take_best(self, runs: list[Run], seam: NDArray[np.bool_], price: float) -> bool:
         """Close the best of the first runs that pays at this price; False where none does."""
