@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from ..finish.pieces import Piece
 
 
+SAMPLED = 32
+"""Corners of a part at which lengths are compared before all of it is."""
+
+
 class Part(NamedTuple):
     """Faces that hang together.
 
@@ -51,38 +55,112 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
     component = face_components(len(faces), table.edge_faces[table.manifold])
     order = stable_order(component, len(faces))
     size = np.bincount(component)
-    twins = np.bincount(size)  # by number of faces: parts that have so many
-    parts: list[Part] = []
-    known: dict[bytes, list[Known]] = {}
-    for ids in np.split(order, np.cumsum(size)[:-1]):
-        part = extracted(opened, ids)
-        if twins[len(ids)] > 1:
-            part = compared(part, parts, known, tolerance)
-        parts.append(part)
-    return parts
+    return with_copies([extracted(opened, ids) for ids in np.split(order, np.cumsum(size)[:-1])], tolerance)
 
 
-class Known(NamedTuple):
-    """The number of a part that is no copy, and how widely its corners are spread, which is that of its copies too."""
+def with_copies(parts: list[Part], tolerance: float) -> list[Part]:
+    """The same parts, each named a copy of the first one before it that it is one of, and that is none itself."""
+    twins = np.bincount([len(part.ids) for part in parts])  # by number of faces: parts that have so many
+    asked = [number for number, part in enumerate(parts) if twins[len(part.ids)] > 1]
+    alike: dict[bytes, list[int]] = {}
+    for number in asked:
+        alike.setdefault(pattern(parts[number].surface.faces, mirrored=False), []).append(number)
+    shelves = {key: shelf_of(parts, numbers, tolerance) for key, numbers in alike.items()}
+    found = list(parts)
+    for number in asked:
+        found[number] = compared(parts, number, shelves, tolerance)
+        if found[number].copy_of < 0:
+            shelves[pattern(parts[number].surface.faces, mirrored=False)].add(number)
+    return found
 
-    number: int
-    spread: float
 
-
-def compared(part: Part, parts: list[Part], known: dict[bytes, list[Known]], tolerance: float) -> Part:
-    """A part, named a copy where it is one of those before it.  known: those that are none, by pattern."""
-    corners = part.surface.triangles.reshape(-1, 3)
-    spread = float(np.linalg.norm(corners - corners.mean(axis=0)))
+def compared(parts: list[Part], number: int, shelves: dict[bytes, Shelf], tolerance: float) -> Part:
+    """That part, named a copy where it is one of those known.  shelves: of parts by pattern."""
+    part = parts[number]
     for mirrored in (False, True):
-        key = pattern(part.surface.faces, mirrored=mirrored)
-        # no corner of a copy is farther off than the tolerance: so far may their spread differ
-        off = 2.0 * tolerance * spread * np.sqrt(3.0 * len(corners))
-        alike = (each.number for each in known.get(key, []) if abs(each.spread - spread) <= off)
-        same = next((n for n in alike if is_copy(parts[n], part, tolerance, mirrored=mirrored)), -1)
+        shelf = shelves.get(pattern(part.surface.faces, mirrored=mirrored))
+        near = [] if shelf is None else shelf.near(shape_of(part, mirrored=mirrored))
+        same = next((known for known in near if is_copy(parts[known], part, tolerance, mirrored=mirrored)), -1)
         if same >= 0:
             return part._replace(copy_of=same, mirrored=mirrored)
-    known.setdefault(pattern(part.surface.faces, mirrored=False), []).append(Known(len(parts), spread))
     return part
+
+
+class Shape(NamedTuple):
+    """Lengths in a part that no motion changes.
+
+    spread: root of the summed squares of its corners' distances from their mean.  lengths: (s,) of those distances, and
+    of edges, at some of the corners.  corners: how many there are.  extent: the longest side of its box.
+    """
+
+    spread: float
+    lengths: NDArray[np.float64]
+    corners: int
+    extent: float
+
+
+def shape_of(part: Part, *, mirrored: bool) -> Shape:
+    """Its lengths; those of its mirror image in the order in which that has them, where asked."""
+    triangles = part.surface.triangles[:, [0, 2, 1]] if mirrored else part.surface.triangles
+    points = triangles.reshape(-1, 3)
+    from_mean = points - points.mean(axis=0)
+    radius = np.sqrt((from_mean**2).sum(axis=1))
+    some = np.unique(np.linspace(0, len(points) - 1, SAMPLED).astype(np.int64))
+    after = some - some % 3 + (some + 1) % 3
+    edge = np.sqrt(((points[after] - points[some]) ** 2).sum(axis=1))
+    return Shape(
+        float(np.sqrt((radius**2).sum())),
+        np.concatenate([radius[some], edge]),
+        len(points),
+        float(np.ptp(points, axis=0).max()),
+    )
+
+
+class Shelf(NamedTuple):
+    """Parts of one pattern (k,), by ascending spread: their numbers and lengths, and which are known to be no copies.
+
+    reach: (k,) how far the lengths of a copy may be off.  place: of each number its row.
+    """
+
+    number: NDArray[np.int64]
+    spread: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+    reach: NDArray[np.float64]
+    tolerance: float
+    place: dict[int, int]
+    known: NDArray[np.bool_]
+
+    def near(self, shape: Shape) -> list[int]:
+        """Those known, ascending, of which a part of that shape may be a copy; of no other is it one."""
+        # no corner of a copy is farther off than the tolerance along an axis: so far may their spread differ
+        off = 2.0 * self.tolerance * shape.spread * np.sqrt(3.0 * shape.corners)
+        first, end = np.searchsorted(self.spread, [shape.spread - off, shape.spread + off]).tolist()
+        row = first + np.flatnonzero(self.known[first:end])
+        fits = (np.abs(self.lengths[row] - shape.lengths) <= self.reach[row, None]).all(axis=1)
+        return np.sort(self.number[row[fits]]).tolist()
+
+    def add(self, number: int) -> None:
+        """From now on this part is known to be no copy."""
+        self.known[self.place[number]] = True
+
+
+def shelf_of(parts: list[Part], numbers: list[int], tolerance: float) -> Shelf:
+    """The shelf of parts of one pattern, none of them known."""
+    shapes = [shape_of(parts[number], mirrored=False) for number in numbers]
+    spread = np.array([shape.spread for shape in shapes])
+    order = np.argsort(spread, kind="stable")
+    ordered = [shapes[row] for row in order.tolist()]
+    extent = np.array([shape.extent for shape in ordered])
+    place = {numbers[row]: rank for rank, row in enumerate(order.tolist())}
+    return Shelf(
+        np.array(numbers)[order],
+        spread[order],
+        np.array([shape.lengths for shape in ordered]),
+        2.0 * np.sqrt(3.0) * tolerance * extent + 1e-12 * spread[order],  # an edge has two ends
+        tolerance,
+        place,
+        np.zeros(len(numbers), dtype=bool),
+    )
 
 
 def extracted(surface: Surface, ids: NDArray[np.int64]) -> Part:

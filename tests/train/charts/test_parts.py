@@ -113,6 +113,49 @@ def test_vertices_that_differ_by_less_than_the_tolerance_are_no_difference(toget
     assert [part.copy_of for part in parts_of(together(one, near))] == [-1, 0]
 
 
+def leaves(count: int, moved: Callable[..., Surface]) -> list[Surface]:
+    """Leaves of one pattern and the same edges, bent differently; each fifth is an earlier one, mirrored by turns."""
+    rng = np.random.default_rng(0)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    made: list[Surface] = []
+    for number in range(count):
+        if number % 5 == 4:
+            made.append(moved(made[number // 2], size=1.0 + number, seed=number, mirrored=number % 2 == 0))
+            continue
+        bend = rng.uniform(0.0, 3.0)
+        points = np.array([[0.0, 0, 0], [1, -1, 0], [3, 0, 0], [1, np.cos(bend), np.sin(bend)]])
+        made.append(Surface(points, faces))
+    return made
+
+
+def test_among_leaves_of_one_pattern_the_copies_are_those_that_pairs_compared_one_by_one_show(
+    together: Callable[..., Surface], moved: Callable[..., Surface]
+) -> None:
+    parts = parts_of(together(*leaves(60, moved)))
+    own: list[int] = []
+    for number, part in enumerate(parts):
+        ways = [(known, mirrored) for mirrored in (False, True) for known in own]
+        same = [way for way in ways if is_copy(parts[way[0]], part, TOLERANCE, mirrored=way[1])]
+        own += [] if same else [number]
+        assert (part.copy_of, part.mirrored) == (same[0] if same else (-1, False))
+    assert 10 <= len(parts) - len(own) < 20
+
+
+def test_a_tree_of_leaves_is_compared_with_few_of_its_leaves(
+    together: Callable[..., Surface], moved: Callable[..., Surface], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pairs: list[tuple[Part, Part]] = []
+
+    def counted(first: Part, second: Part, tolerance: float, *, mirrored: bool) -> bool:
+        pairs.append((first, second))
+        return is_copy(first, second, tolerance, mirrored=mirrored)
+
+    monkeypatch.setattr("flexpara.train.charts.parts.is_copy", counted)
+    parts = parts_of(together(*leaves(500, moved)))
+    assert sum(part.copy_of >= 0 for part in parts) >= 100
+    assert len(pairs) < 2 * len(parts)
+
+
 def test_a_pattern_does_not_depend_on_numbers_but_on_how_faces_meet() -> None:
     faces = np.array([[0, 1, 2], [2, 1, 3]])
     assert pattern(faces, mirrored=False) != pattern(np.array([[0, 1, 2], [1, 2, 3]]), mirrored=False)
