@@ -15,6 +15,7 @@ from ..runtime.io.asset.pages import pages_of, part_of
 from ..runtime.mesh import Surface
 from ..runtime.pack.asked import some_charts
 from ..runtime.pack.pages import pack_pages
+from ..runtime.pack.room import demand_room_for_parts
 from ..runtime.pack.square import square_of
 from ..train.deploy.fit import fit_networks
 from ..train.fromjson import fit_in_force
@@ -49,8 +50,11 @@ def unwrapped_pages(asset: Asset, options: Options, clock: Clock) -> Pages:
     """
     square = square_of(options)
     if options.paged:
+        demand_room_for_parts(asset.surface, options)
         return assemble_pages(asset, train_asset(asset, options, clock), clock, square, options.pages)
     parts = pages_of(asset, options.atlas)
+    for part in parts:
+        demand_room_for_parts(part.surface, options)
     return Pages([(part, assemble(part, train_asset(part, options, clock), clock, square)) for part in parts])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..runtime.pack.room import demand_room_for_parts
 from ..runtime.pack.square import square_of
 from ..runtime.process.meanwhile import load_meanwhile
 from ..train.presets import train_asset, train_cloud
@@ -28,7 +29,8 @@ def load_what_follows() -> None:
 
 
 def unwrapped(asset: Asset, options: Options, clock: Clock, keep: Keep | None = None) -> Unwrapped:
-    """Train, finish, pack, measure, export.  Raises: as `train_asset` and `assemble`."""
+    """Train, finish, pack, measure, export.  Raises: NoRoomError at once, where parts don't fit; as `assemble`."""
+    demand_room_for_parts(asset.surface, options)
     load_what_follows()
     trained = train_asset(asset, options, clock, keep)
     from .assemble import assemble

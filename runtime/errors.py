@@ -6,6 +6,7 @@
     │   ├── MeshError                      it is no mesh, or a mesh with nothing to unwrap
     │   ├── ShapeError                     an array has the wrong shape or dtype
     │   ├── BundleError                    an ONNX file that is not ours, or of another format version
+    │   ├── NoRoomError                    the page is too small for so many charts with their padding
     │   └── ForeignFileError               the output would overwrite a file that flexpara did not write
     ├── MissingDependencyError    exit 3   torch, OpenGL, … is absent; the message has the remedy (an ImportError)
     ├── FinishError               exit 1   no valid atlas could be made (a defect worth reporting)
@@ -47,6 +48,10 @@ class ShapeError(InputError):
 
 class BundleError(InputError):
     """An ONNX file that flexpara did not write, or one of another format version."""
+
+
+class NoRoomError(InputError):
+    """The page is too small for so many charts with their padding."""
 
 
 class ForeignFileError(InputError):

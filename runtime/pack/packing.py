@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..errors import FinishError, InputError
+from ..errors import FinishError, InputError, NoRoomError
 from ..geometry.metrics import uv_charts
 from ..geometry.triangles import signed_areas
 from ..mesh import Asset, Atlas, Charts
@@ -31,6 +31,7 @@ from .growing.outlines import chart_outlines, outline_edges, rotation, upright_a
 from .layouts.nesting import find_nested
 from .layouts.placement import Layout, find_layout
 from .layouts.texels import aligned
+from .room import demand_room, no_room
 from .sheet import Fitted, Sheet, in_rows, in_uv, on_lattice
 
 if TYPE_CHECKING:
@@ -80,7 +81,8 @@ def pack(
         went: on the page similarities, of the same scale for all.  And which charts are not valid there.
 
     Raises:
-        InputError: size or padding is out of range, or the padding leaves no room for the charts.
+        InputError: size or padding is out of range.
+        NoRoomError: the padding leaves no room for the charts; with numbers that do.
         FinishError: a chart has no outline or no finite uv.
     """
     config = config or PackConfig()
@@ -88,7 +90,10 @@ def pack(
     _check(asset, charts, page, padding)
     edges = outline_edges(asset.surface.faces, charts)
     lay_out = in_rows if config.hurried else _close_together
-    fitted, report = lay_out(Sheet(asset.surface.faces, charts, edges, page, padding), config, seed)
+    try:
+        fitted, report = lay_out(Sheet(asset.surface.faces, charts, edges, page, padding), config, seed)
+    except NoRoomError as error:
+        raise no_room(int(charts.face_chart.max()) + 1, page, padding) from error
     scale = scale_of(fitted.placement)
     if config.whole_texels:
         placement = aligned(in_uv(fitted.placement, page), chart_outlines(charts, edges), page, config)
@@ -263,6 +268,8 @@ def _check(asset: Asset, charts: Charts, page: PageSize, padding: int) -> None:
         )
     if not np.isfinite(charts.corner_uv).all():
         raise FinishError("a chart has uv that are not finite; please report the mesh")
-    empty = np.flatnonzero(np.bincount(charts.face_chart) == 0)
+    size = np.bincount(charts.face_chart)
+    empty = np.flatnonzero(size == 0)
     if len(empty):
         raise FinishError(f"chart {empty[0]} has no face; every chart id needs one")
+    demand_room(len(size), page, padding)

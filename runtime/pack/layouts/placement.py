@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import NoRoomError
 from ..growing.outlines import rotation as rotation_by
 from .skyline import Drop, Profile, drop, profile
 
@@ -118,7 +118,7 @@ def find_layout(
         extent: (2,) width and height of the page, the longer one 1.
 
     Raises:
-        InputError: the padding leaves no room for the charts.
+        NoRoomError: the padding leaves no room for the charts.
     """
     columns = int(min(max(config.columns * math.sqrt(len(outlines)), config.least), config.most))
     shapes, found = _sized(_Outlines(outlines, area, rotation, config.long, extent), padding, columns, config)
@@ -154,7 +154,7 @@ def _sized(outlines: _Outlines, padding: float, columns: int, config: PlaceConfi
         if fitting is not None and not fitting[0].unit < unit < too_large:
             unit = fitting[0].unit * math.sqrt(min(too_large / fitting[0].unit, 4.0))
     if fitting is None:
-        raise InputError(
+        raise NoRoomError(
             f"{k} charts with a padding of {100.0 * padding:.3g} % of the atlas side leave no room for "
             "texels; lower the padding or raise the size"
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import NoRoomError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,13 +36,13 @@ def laid_in_rows(
         rotation: how charts may be turned.
 
     Raises:
-        InputError: the padding leaves no room for the charts.
+        NoRoomError: the padding leaves no room for the charts.
     """
     angle, low, size = boxes(outlines, config.angles if rotation == "any" else 1, lying=rotation != "off")
     order = np.argsort(-size[:, 1], kind="stable")
     least, most = 0.0, float(np.sqrt(extent.prod() / max(size.prod(axis=1).sum(), 1e-300)))
     if rows_of(size[order] * (most * config.smallest) + 2.0 * room, extent) is None:
-        raise InputError(
+        raise NoRoomError(
             f"{len(outlines)} charts with a padding of {100.0 * room:.3g} % of the atlas side leave no room for "
             "texels; lower the padding or raise the size"
         )
