@@ -27,6 +27,7 @@ from ..pictures.pictures import picture_pixels, read_in_folder
 from ..rawmesh import RawMesh, merge, transformed, unit_vectors
 from .archive import check_archive
 from .converted import CONVERTED
+from .skinned import unskinned
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -99,7 +100,7 @@ class _FolderResolver(Resolver):
 
 def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
     try:
-        parts, others = _trimesh_parts(data, kind, folder)
+        parts, others = _trimesh_parts(unskinned(data) if kind == "dae" else data, kind, folder)
     except InputError:
         raise
     except ImportError as error:
