@@ -108,23 +108,32 @@ def _uncut(
 
 
 def _fan_starts(uv: NDArray[np.float32], loops: Loops) -> dict[int, int]:
-    """Loop → the corner from which its fan lies right in the plane, or −1, for loops whose own fan does not."""
+    """Loop → the corner from which its fan lies right in the plane, for loops whose own fan does not.
+
+    Triangles of no area, where corners lie on a line, are as few as can be.  −1 where each fan turns over somewhere.
+    """
     points = uv[loops.vertex].astype(np.float64)
     corner, owner = fans(loops.size)
     area = signed_areas(points[corner])
     first, found = np.cumsum(loops.size) - loops.size, dict[int, int]()
     facing = np.sign(np.bincount(owner, area, minlength=len(loops.size)))  # uv of others may be mirrored
-    for loop in np.unique(owner[area * facing[owner] < 0.0]).tolist():
+    upright = area * facing[owner]
+    over = np.zeros(len(loops.size), dtype=np.bool_)
+    over[owner[upright < 0.0]] = True
+    for loop in np.unique(owner[(upright <= 0.0) & (facing[owner] != 0.0)]).tolist():
         ring = points[first[loop] : first[loop] + loops.size[loop]]
-        found[loop] = next((start for start in range(len(ring)) if _is_fan(np.roll(ring, -start, axis=0))), -1)
+        flat = [_without_area(np.roll(ring, -start, axis=0), float(facing[loop])) for start in range(len(ring))]
+        best = int(np.argmin(flat))
+        if best > 0 or over[loop]:
+            found[loop] = best if flat[best] < np.inf else -1
     return found
 
 
-def _is_fan(ring: NDArray[np.float64]) -> bool:
-    """Whether the fan of a ring (n, 2) from its first corner turns nowhere."""
+def _without_area(ring: NDArray[np.float64], facing: float) -> float:
+    """How many triangles of the fan of a ring (n, 2) from its first corner have no area; ∞ where one turns over."""
     spokes = ring[1:] - ring[0]
-    area = cross_2d(spokes[:-1], spokes[1:])
-    return bool((area >= 0.0).all() or (area <= 0.0).all())
+    area = facing * cross_2d(spokes[:-1], spokes[1:])
+    return np.inf if (area < 0.0).any() else float(np.count_nonzero(area == 0.0))
 
 
 def _turned_to(loops: Loops, starts: dict[int, int]) -> Loops:

@@ -106,6 +106,25 @@ def test_a_concave_polygon_begins_where_its_fan_lies_right(mirror: float) -> Non
     assert sorted(loops.corner.tolist()) == list(range(6))
 
 
+STEP = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (1, 0), (3, 0), (3, 2), (0, 2)])
+"""A rectangle with a corner in the middle of a side: its fan from the first one begins with a triangle of no area."""
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_polygon_with_corners_on_a_line_begins_where_all_its_fan_has_area(mirror: float) -> None:
+    asset = asset_of(STEP + "f 1 2 3 4 5\n")
+    loops = loops_of(flat_atlas_of(asset, mirror), asset)
+    assert (loops.size.tolist(), loops.corner.tolist(), loops.cut) == ([5], [1, 2, 3, 4, 0], 0)
+
+
+def test_a_polygon_each_of_whose_fans_has_as_many_triangles_without_area_stays_as_it_is() -> None:
+    halves = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+    text = "".join(f"v {x} {y} 0\n" for x, y in halves)
+    asset = asset_of(text + "f 2 3 4 5 6 7 8 1\n")
+    loops = loops_of(flat_atlas_of(asset), asset)
+    assert (loops.corner.tolist(), loops.cut) == (list(range(8)), 0)
+
+
 def test_a_polygon_that_no_fan_covers_becomes_triangles() -> None:
     asset = asset_of(ZIGZAG + "f 1 2 3 4 5 6 7 8\n")
     loops = loops_of(flat_atlas_of(asset), asset)
