@@ -72,6 +72,7 @@ WORDS = {
     "textures_of_other_uv": "{} on a second uv set not baked|texture|textures",
     "textures_to_8_bits": "{} of 16 bits a channel read as 8|texture|textures",
     "trailing_bytes": "{} behind the last triangle left out|byte|bytes",
+    "unreadable_materials": "materials of {} not found in the file, or damaged, left out|mesh|meshes",
     "uv_not_finite": "uv of {} not finite, set to 0|vertex|vertices",
     "vertices_without_colors": "{} without colours made white|vertex|vertices",
     "vertices_without_z": "{} of two numbers placed at z = 0|vertex|vertices",

@@ -26,8 +26,8 @@ from ..pictures.colors import as_rgba
 from ..pictures.pictures import picture_pixels, read_in_folder
 from ..rawmesh import RawMesh, merge, transformed, unit_vectors
 from .archive import check_archive
+from .collada import lost_meshes, unskinned, with_points, without_materials
 from .converted import CONVERTED
-from .skinned import unskinned
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,7 +100,7 @@ class _FolderResolver(Resolver):
 
 def _read_with_trimesh(data: bytes, kind: str, folder: Path) -> RawMesh:
     try:
-        parts, others = _trimesh_parts(unskinned(data) if kind == "dae" else data, kind, folder)
+        parts, others = _trimesh_parts(data, kind, folder)
     except InputError:
         raise
     except ImportError as error:
@@ -128,9 +128,7 @@ def _unread(data: bytes, kind: str, parts: int) -> dict[str, int]:
 
 def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh], int]:
     """The meshes of the scene in its order, and how many other things with vertices it holds."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # what is wrong with the file is said once, by the exception or by cleaning
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=_FolderResolver(folder), process=False)
+    scene, bare = _scene(data, kind, folder)
     parts, others = [], 0
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
@@ -139,7 +137,30 @@ def _trimesh_parts(data: bytes, kind: str, folder: Path) -> tuple[list[RawMesh],
             parts.append(_part(geometry, np.asarray(matrix, dtype=np.float64)))
         else:
             others += len(getattr(geometry, "vertices", ())) > 0
+    if parts and bare:
+        parts[0] = replace(parts[0], changes={**parts[0].changes, "unreadable_materials": bare})
     return parts, others
+
+
+def _scene(data: bytes, kind: str, folder: Path) -> tuple[trimesh.Scene, int]:
+    """The scene as trimesh reads it, and how many meshes are in it only since their materials were left out."""
+
+    def loaded(data: bytes) -> trimesh.Scene:
+        return trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=_FolderResolver(folder), process=False)
+
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # what is wrong with the file is said once, by the exception or by cleaning
+        if kind != "dae":
+            return loaded(data), 0
+        data = unskinned(data)
+        scene = loaded(data)
+        if lost_meshes(data, scene.geometry):
+            data = with_points(data)
+            scene = loaded(data)
+        if not (lost := lost_meshes(data, scene.geometry)):
+            return scene, 0
+        scene = loaded(without_materials(data, lost))
+        return scene, len(lost - lost_meshes(data, scene.geometry))
 
 
 def _part(mesh: trimesh.Trimesh, matrix: NDArray[np.float64]) -> RawMesh:

@@ -1,14 +1,15 @@
-"""Skinned COLLADA: a mesh with bones stands where it was bound, whatever the node that holds it says."""
+"""COLLADA: a mesh with bones stands where it was bound, and one whose material is absent is there all the same."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import trimesh
 
-from flexpara.runtime.io.formats.skinned import unskinned
+from flexpara.runtime.io.formats.collada import unskinned
 from flexpara.runtime.io.meshfile import load_asset
 
 if TYPE_CHECKING:
@@ -68,3 +69,25 @@ def test_a_file_that_is_cut_off_anywhere_keeps_what_it_has(skinned: Path, share:
 def test_controllers_that_name_each_other_end() -> None:
     ring = b"<controller id='a'><skin source='#b'/></controller><controller id='b'><skin source='#a'/></controller>"
     assert b"instance_geometry" in unskinned(ring + b"<instance_controller url='#a'/>")
+
+
+@pytest.mark.parametrize("broken", ["target", "instance_effect url"])
+def test_a_mesh_whose_material_is_not_in_the_file_is_read_without_it(tmp_path: Path, broken: str) -> None:
+    pytest.importorskip("collada")
+    trimesh.creation.box().export(tmp_path / "box.dae")
+    head, mesh, tail = (tmp_path / "box.dae").read_text(encoding="utf-8").rpartition(f'{broken}="#')
+    assert mesh
+    (tmp_path / "broken.dae").write_text(head + mesh + "absent" + tail, encoding="utf-8")
+    asset = load_asset(tmp_path / "broken.dae")
+    assert len(asset.faces) == 12
+    assert asset.changes["unreadable_materials"] == 1
+    assert "unreadable_materials" not in load_asset(tmp_path / "box.dae").changes
+
+
+def test_decimal_commas_are_read_as_points(tmp_path: Path) -> None:
+    pytest.importorskip("collada")
+    trimesh.creation.box().export(tmp_path / "box.dae")
+    text = (tmp_path / "box.dae").read_text(encoding="utf-8")
+    (tmp_path / "commas.dae").write_text(re.sub(r"(?<=\d)\.(?=\d)", ",", text), encoding="utf-8")
+    point, comma = (load_asset(tmp_path / f"{name}.dae") for name in ("box", "commas"))
+    np.testing.assert_array_equal(comma.positions, point.positions)
