@@ -115,6 +115,19 @@ def exported(kind: str) -> bytes:
     return found.encode() if isinstance(found, str) else bytes(found)
 
 
+def skinned_dae() -> bytes:
+    """A box that hangs on a skin."""
+    text = exported("dae")
+    mesh = text.split(b'<instance_geometry url="#')[1].split(b'"')[0]
+    skin = (
+        b'<controller id="s"><skin source="#%b"><bind_shape_matrix>1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1</bind_shape_matrix>'
+    )
+    library = b"<library_controllers>" + skin % mesh + b"</skin></controller></library_controllers>"
+    text = text.replace(b"<library_visual_scenes>", library + b"<library_visual_scenes>")
+    text = text.replace(b'<instance_geometry url="#%b"' % mesh, b'<instance_controller url="#s"')
+    return text.replace(b"</instance_geometry>", b"</instance_controller>")
+
+
 def binary_off() -> bytes:
     """OFF BINARY, big-endian, faces with a colour count."""
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], ">f4").tobytes()
@@ -285,7 +298,7 @@ MADE: dict[str, Callable[[], list[bytes]]] = {
     ],
     "csv": lambda: [table.encode() for table in TABLES],
     "3mf": lambda: [exported("3mf"), coloured_3mf()],
-    "dae": lambda: [exported("dae")],
+    "dae": lambda: [exported("dae"), skinned_dae()],
 }
 
 
