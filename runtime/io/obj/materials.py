@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from ...errors import MeshError
 from ...material import Material, Picture, seen_through
-from ..pictures.pictures import decode_image, is_deep
+from ..pictures.pictures import decoded_if_known, is_deep
 from ..text import finite, lines_of, shown
 
 if TYPE_CHECKING:
@@ -60,7 +61,9 @@ def _pixels(
     """A picture beside the file, decoded once; None where it is absent.  known and changes grow."""
     if name not in known:
         data = read_sibling(name)
-        known[name] = None if data is None else decode_image(data, known.values())
+        if data is None and (plain := _uncommented(name)) != name:
+            data = read_sibling(plain)
+        known[name] = decoded_if_known(data, known.values())
         changes["textures_to_8_bits"] += data is not None and is_deep(data)
     return known[name]
 
@@ -91,7 +94,7 @@ def _mtl_wrap(text: str) -> tuple[Wrap, Wrap]:
 def _numbers(text: str) -> list[float]:
     """Three numbers in [0, 1]; a single one stands for all.  Raises: MeshError for what is no number."""
     try:
-        found = [min(max(finite(word), 0.0), 1.0) for word in text.split()]
+        found = [min(max(finite(word), 0.0), 1.0) for word in _uncommented(text).split()]
     except ValueError as error:
         raise MeshError(
             f"a material has the factor {shown(text)}, expected numbers; mend or delete the .mtl file"
@@ -99,11 +102,16 @@ def _numbers(text: str) -> list[float]:
     return (found * 3)[:3] if len(found) == 1 else [*found, 0.0, 0.0, 0.0][:3]
 
 
+def _uncommented(text: str) -> str:
+    """Without a comment at its end; names may hold a #, so that of files they are tried whole first."""
+    return re.split(r"(?:^|\s)#", text, maxsplit=1)[0].strip()
+
+
 def _map_name(text: str) -> str:
     """The file name after options such as '-s 1 1 1' (a name with spaces stays whole when there are no options)."""
-    return text.split()[-1] if text.startswith("-") else text
+    return _uncommented(text).split()[-1] if text.startswith("-") else text
 
 
 def _factor(fields: Mapping[str, str], textured: bool) -> tuple[float, float, float, float]:
-    red, green, blue = (1.0, 1.0, 1.0) if textured else _numbers(fields.get("kd") or "1 1 1")
-    return red, green, blue, _numbers((fields.get("d") or "1").split()[-1])[0]
+    red, green, blue = (1.0, 1.0, 1.0) if textured else _numbers(_uncommented(fields.get("kd", "")) or "1 1 1")
+    return red, green, blue, _numbers((_uncommented(fields.get("d", "")) or "1").split()[-1])[0]

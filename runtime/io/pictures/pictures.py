@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 """Kinds of pictures that are opened.  Pillow knows others, some of which start programs or are hardly used."""
+OTHERS = (b"DDS ", b"\xabKTX", b"v/1\x01", b"8BPS", b"#?RADIANCE", b"#?RGBE", b"\x00\x00\x00\x0cJXL ")
+"""How files of other kinds begin: DDS, KTX, OpenEXR, Photoshop, Radiance, JPEG XL."""
 PNG = b"\x89PNG\r\n\x1a\n"
 BROKEN = (OSError, ValueError, SyntaxError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
 BROKEN += (zlib.error, Image.DecompressionBombError, MemoryError)
@@ -72,6 +74,11 @@ def decode_image(data: bytes, beside: Iterable[NDArray[np.uint8] | None] = ()) -
         raise
     except BROKEN as error:
         raise MeshError("a texture is no picture that is read, expected PNG or JPEG; save it as PNG") from error
+
+
+def decoded_if_known(data: bytes | None, beside: Iterable[NDArray[np.uint8] | None] = ()) -> NDArray[np.uint8] | None:
+    """The same, None where there is no file, or a picture of a kind that is not read.  Raises: as `decode_image`."""
+    return None if data is None or data.startswith(OTHERS) else decode_image(data, beside)
 
 
 def is_deep(data: bytes) -> bool:

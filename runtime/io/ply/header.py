@@ -22,7 +22,7 @@ _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4
 _TYPES |= {"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"}
 _TYPES |= {"int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8"}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_FIRST = re.compile(rb"ply[ \t]*(\r\n|\r|\n)")
+_FIRST = re.compile(rb"(?i:ply)[ \t]*(\r\n|\r|\n)")
 
 
 @dataclass(frozen=True)

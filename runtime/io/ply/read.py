@@ -18,7 +18,7 @@ from ...errors import InputError, MeshError
 from ...material import Material, Picture, seen_through
 from ...mesh import Polygons, Stored
 from ..pictures.colors import as_rgba
-from ..pictures.pictures import decode_image, is_deep
+from ..pictures.pictures import decoded_if_known, is_deep
 from ..polygons import Triangles, strip_triangles, triangles_of
 from ..rawmesh import RawMesh, split_at_corners, to_float64
 from .body import Lists, read_body
@@ -200,8 +200,9 @@ def _materials(
     known: dict[str, NDArray[np.uint8]] = {}
     for name in header.textures:
         data = None if name in known else read_sibling(name)
-        if data is not None:
-            known[name] = decode_image(data, known.values())
+        pixels = decoded_if_known(data, known.values())
+        if data is not None and pixels is not None:
+            known[name] = pixels
             changes["textures_to_8_bits"] = changes.get("textures_to_8_bits", 0) + is_deep(data)
         picture = Picture(known[name]) if name in known else None
         changes["missing_textures"] = changes.get("missing_textures", 0) + (picture is None)

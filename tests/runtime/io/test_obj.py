@@ -11,6 +11,7 @@ from PIL import Image
 
 from flexpara.runtime.errors import InputError
 from flexpara.runtime.io.obj.read import read_obj
+from flexpara.runtime.io.pictures.pictures import OTHERS
 from flexpara.runtime.io.rawmesh import RawMesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -110,6 +111,25 @@ def test_a_texture_is_read_with_row_0_on_top() -> None:
     raw = read(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", files.get)
     np.testing.assert_array_equal(raw.materials[0].pictures["base-color"].pixels, pixels)
     assert raw.materials[0].base_color_factor == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_comments_behind_the_values_of_a_material_are_none_of_them() -> None:
+    stream = io.BytesIO()
+    Image.fromarray(np.full((2, 2, 4), 7, np.uint8)).save(stream, format="PNG")
+    text = b"newmtl m\nKd 1 0 0 # red (say)\nd 0.5\t# half\nPr 0.25 #\nmap_Ke a b.png # glow\nmap_Kd #1 #2.png\n"
+    files = {"a.mtl": text, "a b.png": stream.getvalue(), "#1 #2.png": stream.getvalue()}
+    (material,) = read(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", files.get).materials
+    assert material.base_color_factor == (1, 1, 1, 0.5)
+    assert material.roughness == 0.25
+    assert set(material.pictures) == {"emissive", "base-color"}
+
+
+@pytest.mark.parametrize("begin", OTHERS)
+def test_a_texture_of_another_kind_of_picture_is_left_out_and_counted(begin: bytes) -> None:
+    files = {"a.mtl": b"newmtl m\nmap_Kd skin.dds", "skin.dds": begin + bytes(100)}
+    raw = read(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n", files.get)
+    assert nonzero(raw) == {"missing_textures": 1}
+    assert raw.materials[0].pictures == {}
 
 
 def test_what_is_missing_is_counted() -> None:

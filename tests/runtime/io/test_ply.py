@@ -61,6 +61,7 @@ def test_the_header_counts_faces_and_knows_where_data_begin() -> None:
     assert header.start == len(data)
     mac = ply_header(data.replace(b"\n", b"\r") + b"\n")  # the first number of the data may look like a line end
     assert (mac.start, mac.elements) == (header.start, header.elements)
+    assert ply_header(b"PLY" + data[3:]) == header
 
 
 @pytest.mark.parametrize(
