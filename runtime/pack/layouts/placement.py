@@ -65,7 +65,8 @@ class _Found:
 class _Outlines:
     """Upright outlines (k of (s, 2, 2)) of charts of that area, source units, and how they may be turned.
 
-    long: length of a chart, in sides of a square of the area, from which diagonals are tried.  extent: of the page.
+    long: length of a chart, in sides of a square of the area, from which diagonals are tried, unless it is alone: then it
+    stands at the angle that needs least.  extent: of the page.
     """
 
     outlines: list[NDArray[np.float64]]
@@ -76,9 +77,9 @@ class _Outlines:
 
     def shapes(self, unit: float, padding: float) -> _Shapes:
         """Profiles at that size, at each angle they may have."""
-        charts, angles = [], []
+        charts, angles, slanting = [], [], self.rotation == "any" and len(self.outlines) > 1
         for outline in self.outlines:
-            long = self.rotation == "any" and np.ptp(outline, axis=(0, 1)).max() > self.long * math.sqrt(self.area)
+            long = slanting and np.ptp(outline, axis=(0, 1)).max() > self.long * math.sqrt(self.area)
             quarters = range(1 if self.rotation == "off" else 2)
             turns = [0.5 * number for number in quarters]
             shapes = [profile(outline @ rotation_by(turn * math.pi).T * unit, padding) for turn in turns]

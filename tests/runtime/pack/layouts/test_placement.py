@@ -69,6 +69,15 @@ def test_a_pole_too_long_for_the_square_lies_along_its_diagonal() -> None:
     assert layout.scale > 1.2
 
 
+def test_a_chart_that_is_alone_is_not_turned_away_from_the_angle_that_needs_least() -> None:
+    cross = np.concatenate([box(4.0, 0.2) - [2.0, 0.1], box(0.2, 4.0) - [0.1, 2.0]])
+    slanted = cross @ rotation(0.25 * np.pi).T  # 2.97 wide and high, where upright it is 4
+    layout = find_layout([slanted], 1.56, 0.0, CONFIG, np.random.default_rng(0))
+    turned = slanted @ rotation(float(layout.angle[0])).T * layout.scale
+    assert np.ptp(turned, axis=(0, 1)).max() == pytest.approx(1.0, abs=0.02)
+    assert 1.0 / layout.scale == pytest.approx(4.2 / np.sqrt(2.0), rel=0.03)
+
+
 def test_the_same_generator_gives_the_same_layout() -> None:
     sides = np.random.default_rng(0).uniform(0.1, 1.0, (12, 2))
     one, two = (found_for(sides, 0.002, seed=5)[0] for _ in range(2))
