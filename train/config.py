@@ -13,6 +13,7 @@ from .carry.config import ArcConfig, CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import EnergyConfig, FlapConfig, ProjectConfig, SlitConfig
 from .seams.config import ClosingConfig
+from .swift.config import SwiftConfig
 
 
 @dataclass(frozen=True)
@@ -218,6 +219,8 @@ class FinishConfig:
     """What finished charts are laid out by."""
     project: ProjectConfig = field(default_factory=ProjectConfig)
     """Charts by projection, where time is out."""
+    swift: SwiftConfig = field(default_factory=SwiftConfig)
+    """Charts without a search, where there is no time for one."""
     split: SplitConfig = field(default_factory=SplitConfig)
     """Where a chart may be cut in two."""
     foretold: float = 0.4

@@ -8,6 +8,7 @@
 #include "conformal.hpp"
 #include "exact.hpp"
 #include "paths.hpp"
+#include "polish.hpp"
 #include "rigid.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
@@ -138,6 +139,17 @@ static void define_pieces(py::module_& module) {
             }
             return array_of(slim.uv(), 2);
         });
+    // uv (v, 2) after so many sweeps over the vertices with a face around them whose excess energy is above so much.
+    module.def("polished", [](const Numbers& points, const Indices& faces, const Numbers& uv, int sweeps, double above) {
+        demand(uv.shape(0) == points.shape(0), "uv of another piece");
+        Polish polish(points_of(points), faces_of(checked(faces, points.shape(0))),
+                      std::vector<double>(uv.data(), uv.data() + uv.size()));
+        {
+            py::gil_scoped_release free;
+            polish.run(sweeps, above);
+        }
+        return array_of(polish.uv(), 2);
+    });
     module.def("excess_energy", [](const Numbers& points, const Indices& faces, const Numbers& uv, double most) {
         return excess_energy(points_of(points), faces_of(checked(faces, std::min(points.shape(0), uv.shape(0)))), uv.data(), most);
     });
@@ -289,7 +301,7 @@ static void define_clouds(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 5;
+    module.attr("edition") = 7;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);

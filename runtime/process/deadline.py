@@ -5,6 +5,7 @@ The clock and the request are shared with forked copies of the process.
 
 from __future__ import annotations
 
+import math
 import mmap
 import signal
 import threading
@@ -43,13 +44,18 @@ class Deadline:
         """Ask for what there is."""
         self._asked[0] = 1
 
+    @property
+    def left(self) -> float:
+        """Seconds of the budget that are left; infinite where there is none."""
+        return math.inf if self.seconds is None else self.seconds - (time.monotonic() - self._start)
+
     def passed(self, reserve: float = 0.0) -> bool:
         """True where someone asked, or where fewer than ``reserve`` seconds of the budget are left."""
         return self.asked or self.is_spent(reserve)
 
     def is_spent(self, reserve: float = 0.0) -> bool:
         """True where fewer than ``reserve`` seconds of the budget are left, whether someone asked or not."""
-        return self.seconds is not None and time.monotonic() - self._start + reserve >= self.seconds
+        return self.left <= reserve
 
 
 @contextmanager

@@ -22,8 +22,8 @@ from ..carry.straighten import straightened
 from ..finish.energies import finished_by
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
-from ..finish.projected import projected
 from ..finish.slits import Flat
+from ..swift.swift import swift_pieces, swift_rest
 from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
 from .given import Improved, best_of_copies, given_charts, improvement, no_worse
@@ -71,6 +71,10 @@ class Solved(NamedTuple):
     unlike: int | None = None
 
 
+UNSOLVED = Solved([], "swift")
+"""A part that there is no time to search: all such parts are charted together."""
+
+
 @dataclass(frozen=True, eq=False)
 class Work:
     """What the parts of a surface are charted by; total: their area.  given: atlases to improve, one a part."""
@@ -90,7 +94,7 @@ class Work:
         """Charts of a part."""
         part, config = self.parts[number], self.config
         if self.haste.last():
-            return projected_part(part.surface, config)
+            return UNSOLVED
         part = part._replace(surface=steadied(part.surface, config.sliver))
         own = priced(config, config.slit.seams.moved(part.origin, part.scale))
         bound = self.given.get(number)
@@ -106,7 +110,8 @@ class Work:
         polygon = None if self.surface.polygon is None else self.surface.polygon[part.ids]
         page = Page(float(np.sqrt(self.total)) / part.scale, self.charts, polygon)
         solved = solve_part(part.surface, starts, page, config)
-        if config.stretch or (starts.carried and solved.way == "searched") or self.haste.last():
+        whole = solved.way == "swift" or (starts.carried and solved.way == "searched")
+        if config.stretch or whole or self.haste.last():
             return solved
         return solved._replace(pieces=shortened(part.surface, solved.pieces, page, config))
 
@@ -147,7 +152,7 @@ def chart_surface(
     haste = Haste(stage.deadline, len(surface.faces), config.haste)
     late = haste.late
     if haste.is_hopeless(len(surface.faces)):
-        pieces = projected_part(surface, config).pieces
+        pieces = swift_pieces(surface, config, haste.left)
         return Finished(pieces, objective(surface, pieces, config.slit.price), {}, tuple(hurried(stage.deadline, late)))
     stage("parts")
     parts = split_parts(surface, config.congruence)
@@ -169,6 +174,7 @@ def chart_surface(
         for number, part in enumerate(parts)
         for piece in solved[part.copy_of if part.copy_of >= 0 else number].pieces
     ]
+    pieces += swift_rest(surface, pieces, config, haste.left)
     stage("exact check")
     pieces = sorted(all_proven(surface, pieces, config.project, late), key=lambda piece: int(piece.ids.min()))
     stage.end()
@@ -188,20 +194,30 @@ def chart_surface(
     return Finished(pieces, cost, facts, told, better)
 
 
-def projected_part(surface: Surface, config: FinishConfig) -> Solved:
-    """A part for which there is no time."""
-    ids, area = np.arange(len(surface.faces)), float(surface.face_areas().sum())
-    return Solved(projected(surface, ids, area, config.project), "projected")
-
-
 def solve_part(surface: Surface, starts: Starts, page: Page, config: FinishConfig) -> Solved:
-    """Charts of a connected manifold of area 1; where they are carried to it from another mesh, they fit the page."""
-    charts, shape = page.most, surface.shape
+    """Charts of a connected manifold of area 1; where they are carried to it from another mesh, they fit the page.
+
+    Where a budget counts, a part of many faces gets charts without a search first, and one only if there is no noise.
+    """
+    haste = starts.haste
     if starts.is_hopeless:
-        return projected_part(surface, config)
-    exact = unfolded_part(shape, charts, starts.handles, config)
+        return UNSOLVED
+    exact = unfolded_part(surface.shape, page.most, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
+    if not (starts.many and haste.is_strict):
+        return searched_part(surface, starts, page, config, exact)
+    swift = Solved(swift_pieces(surface, config, haste.left), "swift")
+    noise = sum(piece.energy for piece in swift.pieces)
+    if noise > config.swift.noisy or haste.is_hopeless(len(surface.faces), starts.handles):
+        return swift
+    found = searched_part(surface, starts, page, config, exact)
+    return min(swift, found, key=lambda solved: objective(surface, solved.pieces, config.slit.price))
+
+
+def searched_part(surface: Surface, starts: Starts, page: Page, config: FinishConfig, exact: Solved | None) -> Solved:
+    """Charts by the best of several searches; exact: what unfolding gave, if anything."""
+    charts, shape = page.most, surface.shape
     middle = thinned(shape, replace(config.fine, faces=starts.middle)) if starts.many else shape
     whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)

@@ -40,6 +40,15 @@ class Haste:
         config = self.config
         return config.last + (config.proving + config.projecting / self.speed) * self.faces
 
+    @property
+    def is_strict(self) -> bool:
+        """Whether there is a budget that counts more than good charts."""
+        return self.config.strict and self.deadline.seconds is not None
+
+    def left(self) -> float:
+        """Seconds until all charts have to be there."""
+        return self.deadline.left - self.config.last - self.config.proving * self.faces
+
     def is_hopeless(self, faces: int, handles: int = 0, *, thinned: bool = True) -> bool:
         """Whether it is so late that a part would be thinned and searched, and then not half of it laid out."""
         if not self.config.strict or not self.late():

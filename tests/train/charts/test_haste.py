@@ -74,11 +74,11 @@ def test_a_slow_machine_needs_a_larger_reserve() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.35])
-def test_a_surface_without_time_is_projected_in_valid_charts(seconds: float) -> None:
+def test_a_surface_without_time_gets_valid_charts_without_a_search(seconds: float) -> None:
     config = replace(FinishConfig(), haste=STRICT)
     found = chart_surface(knot(), 4, config, 0, Stages(deadline=Deadline(seconds)))
     verify(found.pieces)
     np.testing.assert_array_equal(np.sort(np.concatenate([piece.ids for piece in found.pieces])), np.arange(1600))
     if seconds == 0.0:
-        assert {piece.method for piece in found.pieces} == {"projection"}
+        assert len(found.pieces) < 100
         assert any("time budget of 0 s" in note for note in found.notes)
