@@ -6,7 +6,7 @@ uv are v up in [0, 1]² of the atlas; positions are in the units of the source f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -165,7 +165,7 @@ def unwrap_cloud(
     return UnwrapResult(mesh.asset, found, cloud, mesh)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class UnwrapResult(Unwrapping):
     """An unwrapped mesh or point cloud.
 
@@ -174,9 +174,9 @@ class UnwrapResult(Unwrapping):
     """
 
     asset: Asset
-    found: Unwrapped = field(repr=False)
-    cloud: PointCloud | None = field(default=None, repr=False)
-    cloud_mesh: CloudMesh | None = field(default=None, repr=False)
+    found: Unwrapped
+    cloud: PointCloud | None = None
+    cloud_mesh: CloudMesh | None = None
 
     @property
     def charts(self) -> Charts:
@@ -281,7 +281,7 @@ class UnwrapResult(Unwrapping):
         return output.commit()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class UnwrapPages(Unwrapping):
     """A mesh unwrapped onto several atlases.
 
@@ -291,7 +291,7 @@ class UnwrapPages(Unwrapping):
 
     asset: Asset
     pages: tuple[UnwrapResult, ...]
-    tile: NDArray[np.int64] | None = field(default=None, repr=False)
+    tile: NDArray[np.int64] | None = None
 
     @property
     def reports(self) -> list[dict[str, Any]]:

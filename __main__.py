@@ -10,7 +10,6 @@ import os
 import sys
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -103,8 +102,8 @@ def unwrap(
         options: See Options.
         outputs: See Outputs.
         checkpoints: See CheckpointOptions.
-        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table and a picture in STEM.compare.png, alone;
-            with --report also STEM.compare.html.
+        compare: Numbers of charts, as 1,2,4,8,16: for each a line of a table, also in STEM.compare.json, and a picture
+            in STEM.compare.png, and no mesh; with --report also STEM.compare.html.
         console: See Console.
     """
     if checkpoints.resume is not None:
@@ -134,19 +133,17 @@ def _compare(
 ) -> int:
     """A table and a sheet of each mesh with several numbers of charts; a page to turn them around, where asked."""
     from .bake.pictures.comparison import compare
-    from .bake.report.gather import write_compared
-    from .runtime.files import write_whole
+    from .bake.results.compared import TABLE, compared_files, write_comparison
+    from .runtime.files import OutputFolder
 
     for path in meshes_of(mesh):
-        with console.progress() as progress:
-            asset = load(path, options.select)
-            found = compare(options, words, lambda each, asset=asset: unwrap_asset(asset, each, progress))
-        written = [found.write(output / f"{asset.stem}.compare.png", force=console.force)]
-        if report:
-            page, title = output / f"{asset.stem}.compare.html", f"{asset.stem}, charts compared"
-            named = [(f"at most {row.numbers['asked']}", row.atlas, row.asset, row.report) for row in found.rows]
-            write = partial(write_compared, named, title)
-            written.append(write_whole(page, write, force=console.force))
+        asset = load(path, options.select)
+        table = TABLE.format(asset.stem)
+        with OutputFolder(output, asset.stem, force=console.force, report=table) as folder:
+            folder.check([*compared_files(asset.stem, page=report), table])
+            with console.progress() as progress:
+                found = compare(options, words, lambda each, asset=asset: unwrap_asset(asset, each, progress))
+                written = write_comparison(folder, found, page=report)
         console.show({}, written)
         sys.stdout.write("" if console.quiet else found.table)
     return 0
@@ -237,13 +234,17 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
                     result = unwrap_asset_pages(source, run.options, clock)
             held = {"high": high} if high is not None else {}  # several atlases have none
             written = result.write(folder, run.outputs, progress, console.note, **held)
+            stale = sorted(set(folder.kept) - {path.name for path in written})
     if not isinstance(source, Asset):
         console.note_changes(result.asset)
     run.forget()
+    if stale:
+        console.note(f"{source.stem}: of an earlier run, whose uv may be others: {', '.join(stale)}")
     for facts in result.reports:
         console.notes(facts["train"])
         if summary:
             page = {"page": facts["source"]["stem"]} if len(result.reports) > 1 else {}
+            page |= {"connected_parts": parts} if (parts := facts["changes"].get("components")) else {}
             console.show({**page, **facts["metrics"], **facts["network"]}, ())
     console.show({}, written if summary else ())
     return 0

@@ -102,11 +102,11 @@ def bake(
 def _layout(asset: Asset, options: BakeOptions, console: Console) -> Atlas:
     """The uv that are baked onto; what makes them unfit for that is said, or refused when strict."""
     from ..runtime.geometry.layout import layout_faults
-    from ..runtime.io.gltf.uvsets import uv_of_set
+    from ..runtime.io.gltf.uvsets import with_set
     from ..runtime.pack.packing import atlas_from_uv
     from .square import into_square
 
-    laid_out = asset if options.uv_set is None else replace(asset, uv=uv_of_set(asset, options.uv_set))
+    laid_out = with_set(asset, options.uv_set, console.note)
     atlas = replace(atlas_from_uv(laid_out), size=options.page.stored, padding=options.margin)
     console.demand_none(asset.stem, layout_faults(atlas.corner_uv, tiles=options.udim))
     if options.udim:

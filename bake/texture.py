@@ -15,6 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from ..runtime.brief import Brief
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -26,8 +28,8 @@ Bits = Literal[8, 16, 32]
 FileType = Literal["png", "exr"]
 
 
-@dataclass(frozen=True, eq=False)
-class Texture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Texture(Brief):
     """A baked image, not encoded yet.
 
     pixels: (h, w, c) float32, meaning by `encoding` (see the table above).  bits: per channel in the file, 32 for EXR

@@ -44,7 +44,7 @@ GENERATED = {
 }
 """Kinds of OpenGL objects, as in `glIsQuery` and `glGenQueries`; programs and shaders are made by `glCreateProgram`."""
 NAMES = 1024
-"""So many of each kind are asked for at the least: some devices give the lowest that is free, others never one twice."""
+"""So many of each kind are asked for at the least: some devices give the lowest free one, others never one twice."""
 
 
 @dataclass(frozen=True)

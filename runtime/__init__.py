@@ -5,6 +5,7 @@ Lazy: `flexpara.runtime.UnwrapSession` loads onnxruntime when it is first named,
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,10 @@ _HOME = dict.fromkeys(("Asset", "Atlas", "Charts", "Frame", "Surface"), "mesh") 
     "load_asset": "io.meshfile",
     "measure": "geometry.metrics",
 }
+
+# onnxruntime 1.31 counts its users: it keeps an identifier in their home, and warns on stderr where it can't.  Read
+# once, when onnxruntime is first imported; who wants it sets it to 0.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 
 def __getattr__(name: str) -> object:

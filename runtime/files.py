@@ -100,6 +100,11 @@ class OutputFolder:
         """The files written so far, sorted."""
         return () if self._staging is None else tuple(sorted(entry.name for entry in self._staging.iterdir()))
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Files of earlier runs that this one doesn't write, sorted."""
+        return tuple(sorted(name for name in self._own if name not in self.names and (self.folder / name).is_file()))
+
     def check(self, names: Iterable[str]) -> None:
         """Refuse names that may not be written.
 
@@ -156,8 +161,7 @@ class OutputFolder:
 
     def write_report(self, report: Report) -> None:
         """Write the report: JSON, with `producer`, and the `files` of this run and of earlier ones still there."""
-        kept = {name for name in self._own if (self.folder / name).is_file()}
-        files = sorted({*self.names, *kept, self.report_name})
+        files = sorted({*self.names, *self.kept, self.report_name})
         whole = {"producer": PRODUCER, **report, "files": files}
         if not str(whole["producer"]).startswith(PRODUCER):
             raise InputError(f"producer is {whole['producer']!r}, expected it to start with {PRODUCER!r}")
@@ -246,13 +250,18 @@ def sweep(folder: Path) -> None:
             shutil.rmtree(path)
 
 
+def check_whole(path: Path, *, force: bool = False) -> None:
+    """Refuse, before the work, what `write_whole` would refuse after it.  Raises: as that."""
+    OutputFolder(path.parent, path.stem, force=force).check([path.name])
+
+
 def write_whole(path: Path, writer: Callable[[Path], object], *, force: bool = False) -> Path:
     """Write one file that has no report: whole or not at all, and over an existing one only with force.
 
     Args:
         path: the destination; its folder is made when absent.
         writer: called with a path of the same name elsewhere.
-        force: replace an existing file.
+        force: replace an existing file, as where it is known to be ours.
 
     Raises:
         ForeignFileError, InputError: as OutputFolder.check.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .brief import Brief
 from .geometry.triangles import triangle_areas, triangle_cross, triangle_normals
 from .pagesize import PageSize
 
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from .pagesize import Size
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(Brief):
     """A welded triangle surface: what sampling, training, finishing and metrics work on.
 
     vertices: (v, 3) float64, finite, each used by a face.
@@ -88,8 +89,8 @@ class Frame:
         return (xyz - np.asarray(self.centre)) / self.scale
 
 
-@dataclass(frozen=True, eq=False)
-class Polygons:
+@dataclass(frozen=True, eq=False, repr=False)
+class Polygons(Brief):
     """What the triangles of a mesh were in its file.
 
     corner: (f, 3) int64, the place of each corner in the list of the corners of all polygons.  size: (p,) int64,
@@ -110,16 +111,16 @@ class Polygons:
         return int(np.count_nonzero(self.size > 3))
 
 
-@dataclass(frozen=True, eq=False)
-class Stored:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stored(Brief):
     """Numbers that a file keeps with its vertices: positions (m, 3) as there, by name (m,) of any kind of number."""
 
     positions: NDArray[np.float64]
     values: dict[str, NDArray[Any]]
 
 
-@dataclass(frozen=True, eq=False)
-class Asset:
+@dataclass(frozen=True, eq=False, repr=False)
+class Asset(Brief):
     """A mesh file, cleaned: the file's own vertices (split as the file splits them) and the welded surface beneath.
 
     positions: (n, 3) float64.  faces: (f, 3) int64 into positions, the file's faces in its order, minus those dropped.
@@ -159,8 +160,8 @@ class Asset:
     stored: Stored | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Charts:
+@dataclass(frozen=True, eq=False, repr=False)
+class Charts(Brief):
     """Finished charts, not packed: each flat in its own coordinates, in source units (uv area ≈ surface area).
 
     face_chart: (f,) int64 in [0, k).  corner_uv: (f, 3, 2) float64; inside a chart two faces are joined along an edge
@@ -176,8 +177,8 @@ class Charts:
     method: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Atlas:
+@dataclass(frozen=True, eq=False, repr=False)
+class Atlas(Brief):
     """Charts packed onto a page; vertices are split along seams, so it is what an engine loads.
 
     positions: (n, 3) float64.  faces: (f, 3) int64.  uv: (n, 2) float32 in [0, 1], v up, multiples of 2⁻²⁴ where

@@ -71,6 +71,18 @@ class Saving(ABC, Generic[Wanted]):
 class Unwrapping(Saving["Outputs"]):
     """What an unwrap gives back."""
 
+    def __repr__(self) -> str:
+        pages = [facts["metrics"] for facts in self.reports]
+        told = ", ".join(
+            f"{page['charts']} charts of mean stretch {page['symmetric_dirichlet_mean']:.4f}" for page in pages
+        )
+        return f"{type(self).__name__}({self.asset.stem!r}, {len(self.asset.faces)} faces: {told})"
+
+    @property
+    @abstractmethod
+    def reports(self) -> list[dict[str, Any]]:
+        """The report of each atlas."""
+
     def outputs_kind(self) -> type[Outputs]:
         """Those of unwrapping."""
         from .options.unwrap import Outputs

@@ -13,20 +13,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...runtime.errors import InputError
-from ...runtime.files import write_whole
 from ...runtime.options.seams import AUTO
 from ..colors.color import chart_colors
 from ..colors.lettering import with_text
-from ..files.images import write_png
 from ..raster.context import open_context
 from ..seams.seamcheck import seam_edges
-from ..texture import Texture
 from .canvas import Camera, Lines, draw, three_quarter_axes
 from .preview import FOOT, INK, LETTER_HEIGHT, LETTERS, PAPER, checker_cells, counted, layout, shading_normals, solid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -63,14 +59,6 @@ class Comparison(NamedTuple):
         cells += [[form.format(row.numbers[name]) for name, form in COLUMNS.items()] for row in self.rows]
         widths = [max(len(line[column]) for line in cells) for column in range(len(COLUMNS))]
         return "".join("  ".join(map(str.rjust, line, widths)) + "\n" for line in cells)
-
-    def write(self, path: Path, *, force: bool) -> Path:
-        """Write the sheet as an 8-bit sRGB PNG.
-
-        Raises: MissingDependencyError without OpenGL; ForeignFileError over another file, without force.
-        """
-        pixels = comparison_pixels(self.rows)
-        return write_whole(path, lambda place: write_png(Texture(pixels, "srgb", 8, "png"), place), force=force)
 
 
 def numbers_of_charts(words: Sequence[str]) -> list[int | str]:

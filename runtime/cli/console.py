@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SUMMARY = {
     "page": "{}",
+    "connected_parts": "{}",
     "charts": "{}",
     "symmetric_dirichlet_mean": "{:.4f}",
     "isometric_mean": "{:.5f}",

@@ -155,7 +155,12 @@ def _load(
 ) -> onnxruntime.InferenceSession:
     """The model, checked, with some initializers replaced; the caller keeps those alive."""
     content = path.read_bytes()
-    check_model(content, str(path))
+    try:
+        check_model(content, str(path))
+    except BundleError as error:
+        if path.suffix.lower() == ".onnx":
+            raise
+        raise BundleError(f"{path} is no ONNX model, expected an exported file; {_REMEDY}") from error
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
     options.intra_op_num_threads = 1  # chunks are shared out, see chunks.py

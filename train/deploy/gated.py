@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...runtime.brief import Brief
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -63,8 +65,8 @@ class Grid:
         return (place @ self.strides).astype(np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class GatedExperts:
+@dataclass(frozen=True, eq=False, repr=False)
+class GatedExperts(Brief):
     """The network.
 
     grid: its cells; start (cells,) int32: the code each cell begins with.

@@ -8,6 +8,7 @@ triangle is of.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
@@ -34,6 +35,20 @@ def write_npz(atlas: Atlas, asset: Asset, path: Path) -> None:
         source_vertex=with_file_vertices(atlas, asset).source_vertex,
         polygons=polygons_of(asset),
     )
+
+
+def is_faces(path: Path) -> bool:
+    """Whether `write_faces` wrote a file: its arrays have these names, and there is no other."""
+    return array_names(path) == {"charts", "distortion", "polygons"}
+
+
+def array_names(path: Path) -> set[str]:
+    """Names of the arrays of an .npz file, none of a file that is no such; nothing of them is read."""
+    try:
+        with ZipFile(path) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except (BadZipFile, OSError):
+        return set()
 
 
 def write_faces(path: Path, asset: Asset) -> None:

@@ -15,6 +15,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 
+from ...brief import Brief
 from ...errors import MeshError
 from ..limits import limits
 from ..pictures.pictures import inside
@@ -34,8 +35,8 @@ READ_EXTENSIONS += ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_text
 """Beginnings of extensions that are read, or that say nothing about the shape."""
 
 
-@dataclass(frozen=True, eq=False)
-class GltfFile:
+@dataclass(frozen=True, eq=False, repr=False)
+class GltfFile(Brief):
     """The JSON tree, its buffers' bytes, the folder its references may reach; bufferViews decoded so far."""
 
     tree: dict[str, Any]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...brief import Brief
 from .compression import DRACO, MESHOPT, meshopt_of
 from .references import extensions_in
 
@@ -28,8 +29,8 @@ REACHED += ("KHR_materials_emissive_strength",)
 """Beginnings of extensions whose matter is in the mesh or its maps, or is counted by itself."""
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
+@dataclass(frozen=True, eq=False, repr=False)
+class Part(Brief):
     """One primitive.
 
     mesh, primitive: its numbers.  world: (4, 4) float64, its own space → that of the asset.
@@ -45,8 +46,8 @@ class Part:
         return bool(np.linalg.det(self.world[:3, :3]) < 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Document:
+@dataclass(frozen=True, eq=False, repr=False)
+class Document(Brief):
     """The file, the parts of the asset, and every place where a mesh stands in the default scene."""
 
     file: GltfFile

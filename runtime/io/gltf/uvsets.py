@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,11 +10,28 @@ import numpy as np
 from ...errors import InputError
 from .buffers import as_real
 from .columns import primitive_columns
+from .materials import uv_set
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ...mesh import Asset
+
+
+def with_set(asset: Asset, number: int | None, note: Callable[[str], None]) -> Asset:
+    """The mesh with one of its uv sets; None: the one that its textures are read with, which is said if not the first.
+
+    Raises: as `uv_of_set`.
+    """
+    if number is not None:
+        return replace(asset, uv=uv_of_set(asset, number))
+    materials = [] if asset.document is None else asset.document.file.tree.get("materials", [])
+    if read := sorted({uv_set(material) for material in materials} - {0}):
+        named = " and ".join(map(str, read))
+        note(f"{asset.stem}: textures are read with uv set {named}, which is taken; --uv-set 0 takes the first")
+    return asset
 
 
 def uv_of_set(asset: Asset, number: int) -> NDArray[np.float64]:

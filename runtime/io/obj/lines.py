@@ -61,6 +61,8 @@ def split(data: bytes) -> Lines:
         lines = Lines(found, number, dict(zip(TABLES, plain.tables, strict=False)), (plain.corners, plain.size))
     elif plain is not None:  # a keyword behind spaces
         lines = Lines(*sorted_lines(enumerate(lines_of(data), start=1)))
+    if not data.strip():
+        raise MeshError("the file is empty, expected a mesh; export it again")
     if not lines.count("f"):
         raise MeshError(
             "the file holds points and no faces, expected faces; give points as .ply, .xyz or .npy"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...brief import Brief
 from ..text import lines_of
 from .plain import is_odd
 
@@ -29,8 +30,8 @@ TEXTURES = ("map_", "bump", "norm", "disp", "decal", "refl")
 """Beginnings of the lines of a material library that name pictures."""
 
 
-@dataclass(frozen=True, eq=False)
-class ObjText:
+@dataclass(frozen=True, eq=False, repr=False)
+class ObjText(Brief):
     """The text.
 
     data: the bytes of the file.  line: (p,) int64, the number of the (last) line of each polygon, from 1.  corners:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...brief import Brief
 from ...errors import InputError, ShapeError
 from ...geometry.rows import first_of_each
 from ..clean.weld import SMALLEST_DIAGONAL, weld_vertices
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 FEWEST_POINTS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class PointCloud:
+@dataclass(frozen=True, eq=False, repr=False)
+class PointCloud(Brief):
     """Points of a surface, as the user gave them.
 
     points: (n, 3) float64, finite.  normals: (n, 3) float64 unit (zero where the file has none), or None.

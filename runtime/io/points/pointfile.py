@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, MissingFileError, ShapeError
+from ..formats.npz import array_names
 from ..ply.read import read_ply_points
 from .tables import TEXT, read_table
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 MAX_POINTS = 200_000_000
 READ = (".npy", ".npz", *TEXT, ".ply")
 WRITTEN = (".npz", ".csv")
+ARRAYS = ("points", "uv", "chart", "score")
+HEADER = "x,y,z,u,v,chart,score"
 
 
 def read_points(path: Path) -> NDArray[np.float32] | NDArray[np.float64]:
@@ -70,6 +73,14 @@ def check_output(path: Path) -> None:
         raise InputError(f"{path}: extension {path.suffix!r}, expected {' or '.join(WRITTEN)}; choose another -o")
 
 
+def is_unwrapped(path: Path) -> bool:
+    """Whether `write_unwrapped` wrote a file: its arrays or columns have these names, and there is no other."""
+    if path.suffix.lower() == ".csv":
+        with path.open("rb") as file:
+            return file.readline(len(HEADER) + 2).rstrip() == HEADER.encode()
+    return array_names(path) == set(ARRAYS)
+
+
 def write_unwrapped(
     path: Path,
     points: NDArray[np.floating[Any]],
@@ -96,14 +107,14 @@ def write_unwrapped(
     if shapes != [(n, 3), (n, 2), (n,), (n,)]:
         raise ShapeError(f"points, uv, chart, score have shapes {shapes}, expected (n, 3), (n, 2), (n,), (n,)")
     if path.suffix.lower() == ".npz":
-        np.savez(path, points=points, uv=uv, chart=chart, score=score)
+        np.savez(path, **dict(zip(ARRAYS, (points, uv, chart, score), strict=True)))
         return
     table = np.zeros(n, dtype=[(name, "f8") for name in ("x", "y", "z", "u", "v")] + [("chart", "i8"), ("score", "f8")])
     for name, column in zip(table.dtype.names or (), (*points.T, *uv.T, chart, score), strict=True):
         table[name] = column
     exact = "%.9g" if points.dtype == np.float32 else "%.17g"
     form = [exact, exact, exact, "%.9g", "%.9g", "%d", "%.9g"]
-    np.savetxt(path, table, fmt=form, delimiter=",", header="x,y,z,u,v,chart,score", comments="", encoding="utf-8")
+    np.savetxt(path, table, fmt=form, delimiter=",", header=HEADER, comments="", encoding="utf-8")
 
 
 def _checked(points: NDArray[Any], path: Path) -> NDArray[np.float32] | NDArray[np.float64]:

@@ -102,7 +102,8 @@ def test_face_colours_split_vertices_where_they_differ(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.obj", b"", "no face"),
+        ("a.obj", b"", "the file is empty"),
+        ("a.obj", b"# nothing\n", "no face"),
         ("a.stl", b"", "a.stl"),
         ("a.stl", b"nothing", "a.stl"),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 4_000_000_000), r"a\.stl"),

@@ -143,7 +143,7 @@ def test_what_is_missing_is_counted() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no vertex and no face"),
+        ("", "the file is empty"),
         ("\nhello\n", "it begins with 'hello'"),
         (SQUARE, "points and no faces"),
         (f"{SQUARE}f 1 2\n", "all 1 faces have under three corners .first: line 5"),
