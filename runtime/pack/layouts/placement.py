@@ -65,8 +65,8 @@ class _Found:
 class _Outlines:
     """Upright outlines (k of (s, 2, 2)) of charts of that area, source units, and how they may be turned.
 
-    long: length of a chart, in sides of a square of the area, from which diagonals are tried, unless it is alone: then it
-    stands at the angle that needs least.  extent: of the page.
+    long: length of a chart, in sides of a square of the area, from which diagonals are tried, unless it is alone: it
+    stands at the angle that needs least then.  extent: of the page.
     """
 
     outlines: list[NDArray[np.float64]]
