@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from ..mesh import Asset, Atlas, Polygons
 
+LEAST = 1e-9
+"""Share of a polygon that counts as an area: corners on a line have less, by what float32 holds of them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Loops:
@@ -47,7 +50,7 @@ def loops_of(atlas: Atlas, asset: Asset) -> Loops:
     if asset.polygons is None or len(asset.polygons.corner) != count:
         every = np.arange(3 * count)
         return Loops(np.full(count, 3), atlas.faces.reshape(-1), every, np.arange(count), 0)
-    return _loops(atlas.faces, atlas.uv, asset.polygons)
+    return _loops(atlas, asset.polygons)
 
 
 def first_faces(asset: Asset, loops: Loops) -> NDArray[np.int64]:
@@ -60,8 +63,9 @@ def first_faces(asset: Asset, loops: Loops) -> NDArray[np.int64]:
     return first[loops.polygon]
 
 
-def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons) -> Loops:
-    """Loops of faces (f, 3) whose corners are those of polygons; uv (n, 2) of the vertices."""
+def _loops(atlas: Atlas, polygons: Polygons) -> Loops:
+    """Loops of the faces of an atlas, whose corners are those of polygons."""
+    faces, uv = atlas.faces, atlas.uv
     corner, own = polygons.corner, np.full(int(polygons.size.sum()), -1, dtype=np.int64)
     own[corner] = faces
     polygon = polygons.of_faces
@@ -73,7 +77,7 @@ def _loops(faces: NDArray[np.int64], uv: NDArray[np.float32], polygons: Polygons
     cut = np.zeros(len(polygons.size), dtype=np.bool_)
     cut[polygon[broken]] = True
     loops = _uncut(faces, own, polygons, turned, cut)
-    starts = _fan_starts(uv, loops)
+    starts = _fan_starts(atlas, loops)
     if not starts:
         return loops
     cut[[loops.polygon[loop] for loop, start in starts.items() if start < 0]] = True
@@ -107,26 +111,31 @@ def _uncut(
     return Loops(size[sort], vertex[spread], places[spread], number[sort], int(cut.sum()))
 
 
-def _fan_starts(uv: NDArray[np.float32], loops: Loops) -> dict[int, int]:
+def _fan_starts(atlas: Atlas, loops: Loops) -> dict[int, int]:
     """Loop → the corner from which its fan lies right in the plane, for loops whose own fan does not.
 
-    Triangles of no area, where corners lie on a line, are as few as can be.  −1 where each fan turns over somewhere.
+    Triangles of no area, where corners lie on a line, are as few as can be.  −1 where each fan turns over somewhere, or
+    where what has no area in uv has one in space.
     """
-    points = uv[loops.vertex].astype(np.float64)
+    points, positions = atlas.uv[loops.vertex].astype(np.float64), atlas.positions[loops.vertex]
     corner, owner = fans(loops.size)
     area = signed_areas(points[corner])
     first, found = np.cumsum(loops.size) - loops.size, dict[int, int]()
     facing = np.sign(np.bincount(owner, area, minlength=len(loops.size)))  # uv of others may be mirrored
-    upright = area * facing[owner]
-    over = np.zeros(len(loops.size), dtype=np.bool_)
-    over[owner[upright < 0.0]] = True
-    for loop in np.unique(owner[(upright <= 0.0) & (facing[owner] != 0.0)]).tolist():
-        ring = points[first[loop] : first[loop] + loops.size[loop]]
-        flat = [_without_area(np.roll(ring, -start, axis=0), float(facing[loop])) for start in range(len(ring))]
+    for loop in np.unique(owner[(area * facing[owner] <= 0.0) & (facing[owner] != 0.0)]).tolist():
+        whole, turn = slice(first[loop], first[loop] + loops.size[loop]), float(facing[loop])
+        flat = [_without_area(np.roll(points[whole], -start, axis=0), turn) for start in range(loops.size[loop])]
         best = int(np.argmin(flat))
-        if best > 0 or over[loop]:
-            found[loop] = best if flat[best] < np.inf else -1
+        rings = [np.roll(rows[whole], -best, axis=0) for rows in (points, positions)]
+        found[loop] = -1 if flat[best] == np.inf or (flat[best] > 0.0 and _is_lost(*rings)) else best
     return found
+
+
+def _is_lost(ring: NDArray[np.float64], places: NDArray[np.float64]) -> bool:
+    """Whether a triangle of the fan of a ring (n, 2) has no area, and one in space, where its corners are (n, 3)."""
+    spokes, rays = ring[1:] - ring[0], places[1:] - places[0]
+    area = np.linalg.norm(np.cross(rays[:-1], rays[1:]), axis=1)
+    return bool((area[cross_2d(spokes[:-1], spokes[1:]) == 0.0] > LEAST * area.sum()).any())
 
 
 def _without_area(ring: NDArray[np.float64], facing: float) -> float:

@@ -117,12 +117,22 @@ def test_a_polygon_with_corners_on_a_line_begins_where_all_its_fan_has_area(mirr
     assert (loops.size.tolist(), loops.corner.tolist(), loops.cut) == ([5], [1, 2, 3, 4, 0], 0)
 
 
+THIRDS = [(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (3, 2), (3, 3), (2, 3), (1, 3), (0, 3), (0, 2), (0, 1)]
+"""A square with two corners on each side: no fan of it has area everywhere."""
+
+
 def test_a_polygon_each_of_whose_fans_has_as_many_triangles_without_area_stays_as_it_is() -> None:
-    halves = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
-    text = "".join(f"v {x} {y} 0\n" for x, y in halves)
-    asset = asset_of(text + "f 2 3 4 5 6 7 8 1\n")
+    text = "".join(f"v {x} {y} 0\n" for x, y in THIRDS)
+    asset = asset_of(text + "f 2 3 4 5 6 7 8 9 10 11 12 1\n")
     loops = loops_of(flat_atlas_of(asset), asset)
-    assert (loops.corner.tolist(), loops.cut) == (list(range(8)), 0)
+    assert (loops.corner.tolist(), loops.cut) == (list(range(12)), 0)
+
+
+def test_a_polygon_whose_fans_all_lose_what_has_an_area_in_space_becomes_triangles() -> None:
+    bent = [(x, y, 0.1 * (x == 1 or y == 1)) for x, y in THIRDS]
+    asset = asset_of("".join(f"v {x} {y} {z}\n" for x, y, z in bent) + "f 1 2 3 4 5 6 7 8 9 10 11 12\n")
+    loops = loops_of(flat_atlas_of(asset), asset)
+    assert (set(loops.size.tolist()), loops.cut) == ({3}, 1)
 
 
 def test_a_polygon_that_no_fan_covers_becomes_triangles() -> None:
