@@ -19,7 +19,7 @@ class BudgetConfig:
     """… and of any mesh."""
     slowest: float = 5.0
     """How many times as long may be believed."""
-    packing: float = 8e-6
+    packing: float = 6e-6
     """Of what is done for each face, charts in rows: they are put on the lattice, proven and handed back."""
     close: float = 2.5e-3
     """More for each chart, where they are laid close together."""

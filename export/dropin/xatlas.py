@@ -199,7 +199,7 @@ class Atlas:
         if deadline.passed():
             faces = sum(mesh.faces for mesh in self._waiting)
             LOG.warning(
-                "%d faces took longer than the %g s asked for: reading, projecting and packing alone do",
+                "%d faces took longer than the %g s asked for: reading, laying flat and packing alone do",
                 faces,
                 deadline.seconds,
             )

@@ -119,10 +119,10 @@ class HasteConfig:
     """Whether the budget counts more than good charts: layouts end in time too, and what has none is projected."""
     last: float = 0.3
     """What has to be left of any surface when the last layout ends …"""
-    proving: float = 1.3e-5
+    proving: float = 8e-6
     """… for each face, which is proven, packed and handed back …"""
-    projecting: float = 1.0e-5
-    """… and for each that has no layout by then and is projected, by all cores."""
+    projecting: float = 7e-6
+    """… and for each that has none by then and is charted without a search, by all cores."""
     thinning: float = 1.4e-5
     """What is foreseen for each face of a part that is thinned …"""
     laying: float = 0.8e-5

@@ -23,7 +23,7 @@ from ..finish.energies import finished_by
 from ..finish.fallback import unwrapped_by_xatlas
 from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
-from ..swift.swift import swift_pieces, swift_rest
+from ..swift.swift import better, joined, swift_pieces, swift_rest, swift_sheet
 from ..workers import one_thread_each, parallel_map
 from .develop import Development, unfold
 from .given import Improved, best_of_copies, given_charts, improvement, no_worse
@@ -207,12 +207,12 @@ def solve_part(surface: Surface, starts: Starts, page: Page, config: FinishConfi
         return exact
     if not (starts.many and haste.is_strict):
         return searched_part(surface, starts, page, config, exact)
-    swift = Solved(swift_pieces(surface, config, haste.left), "swift")
-    noise = sum(piece.energy for piece in swift.pieces)
-    if noise > config.swift.noisy or haste.is_hopeless(len(surface.faces), starts.handles):
-        return swift
+    sheet = swift_sheet(surface, config)
+    if sheet.stretch > config.swift.noisy or haste.is_hopeless(len(surface.faces), starts.handles):
+        return Solved(joined(sheet, haste.left), "swift")
     found = searched_part(surface, starts, page, config, exact)
-    return min(swift, found, key=lambda solved: objective(surface, solved.pieces, config.slit.price))
+    swift = better(found.pieces, sheet, lambda pieces: objective(surface, pieces, config.slit.price), haste.left)
+    return found if swift is None else Solved(swift, "swift")
 
 
 def searched_part(surface: Surface, starts: Starts, page: Page, config: FinishConfig, exact: Solved | None) -> Solved:

@@ -57,5 +57,7 @@ class SwiftConfig:
     """… as long as one lowers the objective by such a share …"""
     pace: float = 5e-6
     """… and seconds are left for it: for each face, before the first."""
+    hope: float = 0.8
+    """Share of the objective that joining may leave of it: what a search made lower still is not tried to be beaten."""
     noisy: float = 0.02
     """Mean excess energy of these charts from which a search is not begun: what stretches them is noise."""

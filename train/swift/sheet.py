@@ -60,6 +60,11 @@ class Sheet:
         self.count = 0
         self.projections: set[int] = set()
 
+    @property
+    def stretch(self) -> float:
+        """Mean excess energy."""
+        return float(self.energy.sum() / self.total)
+
     def laid(self, ids: NDArray[np.int64], label: NDArray[np.int64]) -> Iterator[Batch]:
         """Faces ids (m,) laid flat as the charts (m,), numbers from 0, that they would be; in batches."""
         faces = self.surface.faces[ids]
@@ -93,11 +98,8 @@ class Sheet:
 
     def inside(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """(p, 2) places in ids (m,) of faces that share an edge."""
-        place = np.full(len(self.chart), OPEN)
-        place[ids] = np.arange(len(ids))
-        first, second = place[self.graph.pairs[:, 0]], place[self.graph.pairs[:, 1]]
-        both = (first >= 0) & (second >= 0)
-        return np.stack([first[both], second[both]], axis=1)
+        table = edge_table(self.surface.faces[ids])
+        return table.edge_faces[table.manifold]
 
     def connected(self, ids: NDArray[np.int64], label: NDArray[np.int64]) -> NDArray[np.int64]:
         """(m,) connected groups, numbered from 0, of equal label of faces ids (m,)."""

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.distortion import MOST_EXCESS, TRIM, oriented_energy
+from ..finish.flatten import jacobians
 from ..workers import one_thread_each
 from .join import Joining
 from .settle import settled
@@ -35,11 +37,42 @@ def no_end() -> float:
 
 def swift_pieces(surface: Surface, config: FinishConfig, left: Left = no_end) -> list[Piece]:
     """Charts of a surface, whose edges need not be manifold; they are valid, whatever time is left to join them."""
+    return joined(swift_sheet(surface, config), left)
+
+
+def swift_sheet(surface: Surface, config: FinishConfig) -> Sheet:
+    """The same before they are joined."""
     with one_thread_each():
         sheet = Sheet(surface, config)
         settled(sheet)
+        return sheet
+
+
+def joined(sheet: Sheet, left: Left = no_end) -> list[Piece]:
+    """Charts of a sheet, joined as far as it pays and time is left."""
+    with one_thread_each():
         Joining(sheet).run(left)
         return sheet.pieces()
+
+
+def better(
+    found: list[Piece], sheet: Sheet, objective: Callable[[list[Piece]], float], left: Left
+) -> list[Piece] | None:
+    """The charts of a sheet, joined, if they are better than those found elsewhere; else None."""
+    cost, swift = objective(found) + trimmed(found), sheet.pieces()
+    if cost > sheet.config.swift.hope * (objective(swift) + trimmed(swift)):
+        swift = joined(sheet, left)
+    return swift if objective(swift) + trimmed(swift) < cost else None
+
+
+def trimmed(pieces: list[Piece]) -> float:
+    """What faces are stretched beyond the bound of an objective, up to that of metrics; pieces of area 1 together."""
+    lost = 0.0
+    for piece in pieces:
+        surface = piece.flat.surface
+        energy = np.minimum(oriented_energy(jacobians(surface, piece.flat.uv)), TRIM)
+        lost += float(surface.face_areas() @ np.maximum(energy - 1.0 - MOST_EXCESS, 0.0))
+    return lost
 
 
 def swift_rest(surface: Surface, pieces: list[Piece], config: FinishConfig, left: Left) -> list[Piece]:
