@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from ..runtime.geometry.cutgraph import SeamPrices
 from ..runtime.geometry.places import PlaceConfig
+from ..runtime.pack.config import ForeseenConfig
 from .carry.config import ArcConfig, CarryConfig, FineConfig, HasteConfig
 from .deploy.config import FitConfig, WrapConfig
 from .finish.config import EnergyConfig, FlapConfig, ProjectConfig, SlitConfig
@@ -162,6 +163,26 @@ class SplitConfig:
 
 
 @dataclass(frozen=True)
+class PageConfig:
+    """What charts waste of the page, as a part of the objective."""
+
+    price: float = 0.01
+    """Mean excess energy that an empty page would cost: half of it, where charts cover half.  0: the page is free."""
+    hull: float = 1.0
+    """Share of that price at which the room between a chart and its convex hull counts while a search goes on."""
+    tries: int = 16
+    """Seams that may be tried to be closed on the proxy where there are few enough charts …"""
+    tries_fewer: int = 60
+    """… and where fewer are asked for."""
+    near: float = 1.02
+    """Objective of a state, as a multiple of the best one's, up to which it is taken where it has fewer charts."""
+    far: float = 1.1
+    """Objective of charts carried back, as a multiple of the best ones', beyond which they are not laid out further."""
+    foreseen: ForeseenConfig = field(default_factory=ForeseenConfig)
+    """How much charts will cover, foreseen."""
+
+
+@dataclass(frozen=True)
 class SymmetryConfig:
     """Mirrored charts."""
 
@@ -213,6 +234,8 @@ class FinishConfig:
     """Parts of many faces."""
     haste: HasteConfig = field(default_factory=HasteConfig)
     """Time budgets."""
+    page: PageConfig = field(default_factory=PageConfig)
+    """What is wasted of the page."""
     symmetry: SymmetryConfig = field(default_factory=SymmetryConfig)
     """Mirrored charts."""
     energy: EnergyConfig = field(default_factory=EnergyConfig)
@@ -269,6 +292,16 @@ class FinishConfig:
     """Share of the surface under which a piece is small: a merge across a short border is tried too."""
     slit_above: float = 0.003
     """Excess energy over which a finished piece is slit once more, with contacts."""
+
+    @property
+    def page_price(self) -> float:
+        """What an empty page costs: nothing where the shortest seams are asked for."""
+        return 0.0 if self.stretch else self.page.price
+
+    @property
+    def hull_price(self) -> float:
+        """What room as large as the surface costs that charts leave in their convex hulls."""
+        return self.page_price * self.page.hull
 
 
 @dataclass(frozen=True)

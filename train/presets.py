@@ -89,6 +89,7 @@ def fast_config(options: TrainOptions) -> TrainConfig:
     plain = TrainConfig(charts=options.most_charts, seed=options.seed)
     stretch = 0.0 if options.max_stretch is None else options.max_stretch - 1.0
     finish = replace(plain.finish, slit=replace(plain.finish.slit, price=options.seam_price), stretch=stretch)
+    finish = replace(finish, page=replace(finish.page, price=options.page_price))
     finish = replace(finish, energy=replace(finish.energy, kind=options.energy))
     finish = replace(finish, symmetry=replace(finish.symmetry, axis=options.symmetry))
     if options.seams == "crease":

@@ -32,9 +32,12 @@ class SeamOptions:
     seam_price: float = 0.003
     """Mean stretch above 1 that a seam as long as √area has to save: higher for fewer and shorter seams and more
     stretch, lower for the reverse."""
+    page_price: float = 0.01
+    """Mean stretch above 1 that a page left empty would have to save: what share of it charts leave empty costs so much
+    of this. Higher for charts that fill the page, 0 for seams and stretch alone."""
     max_stretch: float | None = None
     """Mean stretch (symmetric Dirichlet, 1 is none) that each connected part may have, for the shortest seams that
-    keep it, for instance 1.025; by default the seam price decides alone."""
+    keep it, whatever they waste of the page, for instance 1.025; by default the prices decide alone."""
     seams: Literal["short", "hidden", "crease"] = "short"
     """Where seams go: short ones anywhere, hidden ones where the surface sees less of the sky (needs flexpara[bake]),
     or along creases, though they are longer for it."""
@@ -72,6 +75,9 @@ class SeamOptions:
         priced = 0.0 < self.seam_price <= DEAREST
         found = f"seam-price is {self.seam_price}, expected above 0, up to {DEAREST:g}"
         demand(priced, f"{found}; pass for instance --seam-price 0.003")
+        fits = 0.0 <= self.page_price <= DEAREST
+        found = f"page-price is {self.page_price}, expected 0 to {DEAREST:g}"
+        demand(fits, f"{found}; pass for instance --page-price 0.01")
         bounded = self.max_stretch is None or LEAST_STRETCH <= self.max_stretch <= MOST_STRETCH
         found = f"max-stretch is {self.max_stretch}, expected {LEAST_STRETCH:g} to {MOST_STRETCH:g}"
         demand(bounded, f"{found}; pass for instance --max-stretch 1.025")

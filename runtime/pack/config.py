@@ -67,6 +67,22 @@ class NestConfig:
 
 
 @dataclass(frozen=True)
+class ForeseenConfig:
+    """What charts will cover of a page, foreseen without packing them."""
+
+    columns: int = 96
+    """Columns of the skyline on which they are dropped."""
+    fill: float = 0.55
+    """Share of that page that they would cover at the size they are dropped at."""
+    padding: float = 1.0 / 256.0
+    """Padding around each, share."""
+    tries: int = 16
+    """Orders and widths that are tried."""
+    shuffle: float = 0.3
+    """By how much (natural logarithm) sizes are falsified for a new order, typically."""
+
+
+@dataclass(frozen=True)
 class RowConfig:
     """Charts in rows of their boxes, where there is no time for another layout."""
 

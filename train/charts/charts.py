@@ -15,7 +15,6 @@ import numpy as np
 from ...runtime.geometry.topology import edge_table
 from ...runtime.mesh import Surface
 from ...runtime.process.progress import Stages
-from ..carry.carry import carried_back
 from ..carry.fine import refined
 from ..carry.proxy import simplified, thinned
 from ..carry.straighten import straightened
@@ -37,12 +36,13 @@ from .proof import all_proven, is_valid
 from .shorten import Page, shortened
 from .slivers import steadied
 from .starts import NOTHING, Starts, best_search
-from .tighten import back_on, is_asked, settled, tightened
+from .tighten import led_back, settled, way_down
 
 if TYPE_CHECKING:
     from ..config import FinishConfig
     from ..search.search import Search
     from .starts import Known
+    from .tighten import Way
 
 
 class Finished(NamedTuple):
@@ -221,12 +221,9 @@ def searched_part(surface: Surface, starts: Starts, page: Page, config: FinishCo
     middle = thinned(shape, replace(config.fine, faces=starts.middle)) if starts.many else shape
     whole = exact is not None and len(middle.faces) <= starts.whole
     coarse = middle if whole else simplified(middle, starts.faces)
-    found = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
-    asked = is_asked(found, charts, config)
-    if not starts.late():
-        found = tightened(found, charts, config, starts.late) if asked else found
-        found = found if starts.holed else straightened(found, config.bands)
-    pieces = brought_back((surface, middle, coarse), found, starts, page, asked=asked)
+    bests = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
+    ways = [way_down(best, charts, starts) for best in bests]
+    pieces = brought_back((surface, middle, coarse), ways, starts, page)
     facets = exact.pieces if exact is not None and exact.way == "facets" else []
     if facets and rank(facets, surface, charts, config) <= rank(pieces, surface, charts, config):
         return Solved(facets, "facets")
@@ -238,32 +235,23 @@ def searched_part(surface: Surface, starts: Starts, page: Page, config: FinishCo
     return Solved(pieces, "searched")
 
 
-def brought_back(
-    levels: tuple[Surface, Surface, Surface],
-    found: Search,
-    starts: Starts,
-    page: Page,
-    *,
-    asked: bool,
-) -> list[Piece]:
-    """What was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy.
+def brought_back(levels: tuple[Surface, Surface, Surface], ways: list[Way], starts: Starts, page: Page) -> list[Piece]:
+    """The best of what was found on the proxy, on the surface itself; levels: the surface, its middle mesh, the proxy.
 
     Where there is a middle mesh, charts too long for the page are cut there: a tenth of the faces says where as well.
-    asked: few charts or short seams were, so that what was closed is led back as a network of seams.
     """
     (surface, middle, coarse), late, last = levels, starts.haste.late, starts.haste.last
     charts, config = page.most, starts.config
     if late() and coarse is not surface:
-        return refined(surface, coarse, list(found.pieces.values()), config, late, last)
-    ways = [found]
+        return refined(surface, coarse, list(ways[-1].found.pieces.values()), config, late, last)
+    found = [way.found for way in ways]
     if coarse is not middle:
-        labels = [] if asked else [carried_back(middle, coarse, found, charts, config)]
-        ways = labels or back_on(middle, coarse, found, charts, config)
+        found = [led for way in ways for led in led_back(middle, coarse, way, charts, config)]
     if late():
-        found = ways[0]
+        found = found[0]
     else:
-        ways = [straightened(way, config.bands_carried) for way in ways] if coarse is not middle else ways
-        found = settled(ways, charts, config, late)
+        straight = [straightened(way, config.bands_carried) for way in found] if coarse is not middle else found
+        found = settled(straight, charts, config, late)
     found.mend()
     pieces = list(found.pieces.values())
     if starts.carried and not (config.stretch or late()):

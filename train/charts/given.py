@@ -24,7 +24,7 @@ from ..finish.pieces import Overlapping, measured
 from ..finish.slits import Flat
 from ..search.labels import connected_pieces, dual_graph
 from ..search.search import Search
-from .objective import objective, priced, rank
+from .objective import objective, priced, rank, wasted
 from .parts import placed
 from .slivers import steadied
 
@@ -146,9 +146,9 @@ def improvement(
     """What came of a given atlas: pieces of the whole surface."""
     total = sum(part.scale**2 for part in parts)
     before = [placed(piece, parts[at], surface, total) for at, each in given.items() for piece in each.pieces.values()]
-    price = config.slit.price
+    cost = [objective(surface, each, config.slit.price) + wasted(each, config) for each in (before, pieces)]
     return Improved(
         (len(before), len(pieces)),
-        (objective(surface, before, price), objective(surface, pieces, price)),
+        (cost[0], cost[1]),
         (1.0 + sum(piece.energy for piece in before), 1.0 + sum(piece.energy for piece in pieces)),
     )

@@ -178,7 +178,7 @@ def joined(search: Search, pairs: list[tuple[int, int]], charts: int, late: Late
     for pair in touching:
         merged = search.tried[pair]
         if merged is not None:
-            apart = sum(search.pieces[key].cost(search.price) for key in pair) + search.price * borders[pair]
+            apart = sum(search.cost_of(search.pieces[key]) for key in pair) + search.price * borders[pair]
             merges.append(Merge(apart - search.cost(merged), pair, merged))
     for merge in sorted(merges, key=lambda each: -each.gain):
         many = len(search.pieces) > charts and search.energy() - merge.gain <= search.config.most_excess

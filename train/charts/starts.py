@@ -141,8 +141,13 @@ class Starts:
         return pieces_by_score(self.scores(points), surface.face_areas(), graph, self.config.labels)
 
 
-def best_search(surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]) -> Search:
-    """The search of lowest objective among several starts; ``unfolded``: the part's flat charts, another start."""
+def best_search(
+    surface: Surface, charts: int, starts: Starts, config: FinishConfig, unfolded: list[Piece]
+) -> list[Search]:
+    """The search of lowest objective among several starts, and what it becomes as more charts are allowed.
+
+    ``unfolded``: the part's flat charts, another start.
+    """
     graph = dual_graph(surface, edge_table(surface.faces), config.labels.seams)
     begun = []
     if unfolded:
@@ -163,9 +168,18 @@ def best_search(surface: Surface, charts: int, starts: Starts, config: FinishCon
     ahead = [search for cost, search in by_cost.items() if cost <= config.start.behind * min(by_cost)]
     rounds = config.few_rounds if starts.small else config.rounds
     few = config.closing.charts
-    ahead = parallel_map(lambda search: search.finish(few, rounds, starts.late, starts.haste.last), ahead)
-    best = min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, few, config))
-    return best if charts <= few else best.finish(charts, rounds, starts.late, starts.haste.last)
+
+    def finished(search: Search, most: int) -> Search:
+        return search.finish(most, rounds, starts.late, starts.haste.last)
+
+    ahead = parallel_map(lambda search: finished(search, few), ahead)
+    bests = [min(ahead, key=lambda search: rank(list(search.pieces.values()), surface, few, config))]
+    while few < charts and len(bests[-1].pieces) >= few:
+        few = min(2 * few, charts)
+        more = finished(bests[-1].twin(), few)
+        if more.objective() < bests[-1].objective():
+            bests.append(more)
+    return bests[-1:] if config.stretch else bests
 
 
 def begun_searches(surface: Surface, graph: DualGraph, starts: Starts, counts: tuple[float, ...]) -> list[Search]:

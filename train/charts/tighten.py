@@ -2,30 +2,100 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...runtime.process.deadline import Late, never
 from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carried_back
 from ..carry.network import network_carried
+from ..carry.straighten import straightened
 from ..seams.closing import Bounds, Closing
 from ..workers import parallel_map
-from .objective import rank
+from .objective import rank, search_cost
 
 if TYPE_CHECKING:
     from ...runtime.mesh import Surface
     from ..config import FinishConfig
     from ..search.search import Search
+    from .starts import Starts
 
 
-def is_asked(search: Search, charts: int, config: FinishConfig) -> bool:
-    """Whether fewer charts or shorter seams are asked for than the search found.
+class Way(NamedTuple):
+    """A state of a search on the proxy that is laid out on the surface.
 
-    Where neither is, closing lowers the objective by a few percent, and packing by a tenth: charts that branch waste
-    the page.  Far more charts than asked for are left as they are.
+    before: the state that seams were closed from.  forced: more were closed than pay, for fewer charts or short seams.
     """
-    above = len(search.pieces) - charts
-    return config.stretch > 0.0 or 0 < above <= config.start.crowded
+
+    found: Search
+    before: Search
+    forced: bool = False
+
+
+def way_down(search: Search, charts: int, starts: Starts) -> Way:
+    """The search with its borders straightened, and seams closed: where that pays, or where it is asked for."""
+    config, late = starts.config, starts.late
+    crowded = len(search.pieces) - charts > config.start.crowded
+    if late():
+        return Way(search, search)
+    if config.stretch:
+        search = tightened(search, charts, config, late)
+    straight = search if starts.holed else straightened(search, config.bands)
+    if config.stretch or crowded:
+        return Way(straight, straight, forced=not crowded)
+    return closed(straight, charts, 0 if starts.small else config.page.tries, late)
+
+
+def closed(search: Search, charts: int, tries: int, late: Late) -> Way:
+    """The best state of a search on its way down to one chart, as far as few enough are asked for.
+
+    First every closing that pays is made, whatever the limit on charts, and then those that make fewer, as long as
+    that costs little or is asked for: what is seen on the way to few charts is seen on the way to fewer.
+    """
+    config, page = search.config, search.config.page
+    cost = [search_cost(search)]
+    work = Closing(search.twin(), Bounds(len(search.pieces), config.most_excess), config.closing, late)
+
+    def enough() -> bool:
+        cost.extend(search_cost(state) for state in work.seen[len(cost) - 1 :])
+        return late() or (len(work.search.pieces) <= charts and cost[-1] > page.near * min(cost))
+
+    work.close(config.slit.price, tries)
+    work.bounds, work.late = Bounds(1, config.most_excess), enough
+    work.close(config.slit.price, tries if len(work.search.pieces) <= charts else page.tries_fewer)
+    seen = [search, *work.seen]
+    enough()
+    few = [n for n, state in enumerate(seen) if len(state.pieces) <= charts] or [len(seen) - 1]
+    free, found = (best_of([seen[n] for n in among], [cost[n] for n in among]) for among in (range(len(seen)), few))
+    return Way(found, search) if found is free else Way(with_straight_seams(found), search, forced=True)
+
+
+def best_of(states: list[Search], cost: list[float]) -> Search:
+    """The state of fewest charts among those that cost about as little as the best, the best of equals."""
+    most = states[0].config.page.near * min(cost)
+    near = [
+        (len(state.pieces), each, n) for n, (state, each) in enumerate(zip(states, cost, strict=True)) if each <= most
+    ]
+    return states[min(near)[-1]]
+
+
+def led_back(surface: Surface, coarse: Surface, way: Way, charts: int, config: FinishConfig) -> list[Search]:
+    """A way on the surface: by labels, as a network of seams where more were closed than pay.
+
+    Where closed seams do not come back as what they were, what they were closed from is another.
+    """
+    if way.forced:
+        led = back_on(surface, coarse, way.found, charts, config)
+        by_network = len(led) == 1 and led[0].objective() <= way.found.objective()
+        return (
+            [*led, carried_back(surface, coarse, way.found, charts, config)]
+            if by_network and not config.stretch
+            else led
+        )
+    led = [carried_back(surface, coarse, way.found, charts, config)]
+    if way.before is not way.found and search_cost(led[0]) > search_cost(way.before):
+        led.append(carried_back(surface, coarse, way.before, charts, config))
+    cost = [search_cost(search) for search in led]
+    return [search for search, each in zip(led, cost, strict=True) if each <= config.page.far * min(cost)]
 
 
 def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:

@@ -6,12 +6,15 @@ ids (m,) are faces of the surface.  Areas and lengths are shares of the whole su
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import split_non_manifold_vertices
+from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
 from .arap import unfolded
 from .contact import Relaxed, boundary_edges, converge, excess_energy, rim_faces, rim_overlaps, separate
@@ -55,6 +58,17 @@ class Piece:
     def cost(self, price: float) -> float:
         """What the piece adds to the objective, its border left out."""
         return self.energy + price * self.slit_length
+
+    @cached_property
+    def waste(self) -> float:
+        """Area between the flattening and its convex hull, in the units of uv squared."""
+        uv = self.flat.uv
+        points = uv[boundary_edges(self.flat.surface.faces)[:, 0]]
+        try:
+            hull = float(ConvexHull(points).volume)
+        except QhullError:  # all points on a line
+            return 0.0
+        return max(hull - float(np.abs(signed_areas(uv[self.flat.surface.faces])).sum()), 0.0)
 
     def rim(self, surface: Surface) -> NDArray[np.int64]:
         """Vertices of the surface that lie on the piece's border or on its slits."""

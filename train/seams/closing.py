@@ -76,6 +76,8 @@ class Closing:
         self.foretold: dict[Name, float] = {}
         self.tried: dict[Name, Trimmed | None] = {}
         self.vain: set[tuple[int, int, int]] = set()
+        self.seen: list[Search] = []
+        """The search after each run that was closed."""
 
     def close(self, price: float, tries: int) -> None:
         """Close what pays at this price of a seam, within the bounds and so many tries.
@@ -129,7 +131,9 @@ class Closing:
         saved = run.saved - part.rim
         if not np.isfinite(price):
             return -saved
-        return part.piece.energy - sum(piece.energy for piece in sides) - price * saved
+        page = self.search.config.hull_price
+        waste = page * (part.piece.waste - sum(piece.waste for piece in sides)) / self.search.area if page else 0.0
+        return part.piece.energy - sum(piece.energy for piece in sides) - price * saved + waste
 
     def take(self, run: Run, price: float) -> bool:
         """Replace the pieces beside a run; False, and nothing done, where the bounds are broken."""
@@ -140,6 +144,7 @@ class Closing:
         most = max(len(before), self.bounds.charts)
         least = 0.0 if price == search.price else -np.inf
         if search.exchange(run.sides, [part], least, most) and search.energy() <= self.bounds.excess:
+            self.seen.append(search.twin())
             return True
         search.pieces = before
         self.tried[run.name] = None

@@ -107,7 +107,7 @@ class Search(State):
             block = ranked[at : at + self.config.looks]
             self.try_merges([pair for _, pair, _ in block])
             valid = [
-                Merge(apart - self.cost(merged), pair, merged)
+                Merge(apart - self.cost(merged) + self.wasted(pair), pair, merged)
                 for _, pair, apart in block
                 if (merged := self.tried[pair])
             ]
@@ -115,6 +115,10 @@ class Search(State):
             if best is not None and best.gain > least:
                 return best
         return None
+
+    def wasted(self, pair: Pair) -> float:
+        """What two pieces cost by the page that they waste."""
+        return sum(self.cost_of(self.pieces[key]) - self.pieces[key].cost(self.price) for key in pair)
 
     def try_merges(self, pairs: list[Pair]) -> None:
         """Flatten pairs of pieces as one; each pair once."""
@@ -160,14 +164,14 @@ class Search(State):
         for parts_ids in ways:
             parts = [next(found) for _ in parts_ids]
             cut = links.cut_length(np.isin(piece.ids, parts_ids[0])) / self.unit
-            gain = piece.cost(self.price) - sum(self.cost(part) for part in parts) - self.price * cut
+            gain = self.cost_of(piece) - sum(self.cost(part) for part in parts) - self.price * cut
             if best is None or gain > best.gain:
                 best = Split(gain, parts)
         return best
 
     def cost(self, found: Trimmed) -> float:
         """What a piece adds to the objective, its outer border left out; its flaps' counted in."""
-        return found.piece.cost(self.price) + self.price * found.rim
+        return self.cost_of(found.piece) + self.price * found.rim
 
     def part(self, piece: Piece, ids: NDArray[np.int64]) -> Trimmed:
         """Some faces of a piece: laid out anew, or as they lie in it, relaxed or not, whichever costs least."""
@@ -224,8 +228,8 @@ class Search(State):
         """The key of the piece of highest cost that is not settled; None where none could gain from a split."""
         keys = [key for key in self.pieces if key not in self.settled]
         least = self.price * self.config.slit.shortest
-        worst = max(keys, key=lambda key: self.pieces[key].cost(self.price), default=None)
-        return worst if worst is not None and self.pieces[worst].cost(self.price) > least else None
+        worst = max(keys, key=lambda key: self.cost_of(self.pieces[key]), default=None)
+        return worst if worst is not None and self.cost_of(self.pieces[worst]) > least else None
 
     def improve(self, most: int) -> bool:
         """Split one piece, and merge two others where the limit asks for it; False when nothing is left to gain."""

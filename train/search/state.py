@@ -146,8 +146,13 @@ class State:
         return sum(piece.energy for piece in self.pieces.values())
 
     def objective(self) -> float:
-        """Σ costs + price · borders."""
-        return sum(piece.cost(self.price) for piece in self.pieces.values()) + self.price * sum(self.borders().values())
+        """Σ costs + price · borders, the page counted by the room that charts leave in their convex hulls."""
+        return sum(self.cost_of(piece) for piece in self.pieces.values()) + self.price * sum(self.borders().values())
+
+    def cost_of(self, piece: Piece) -> float:
+        """What a piece adds to the objective, its border left out."""
+        page = self.config.hull_price
+        return piece.cost(self.price) + (page * piece.waste / self.area if page else 0.0)
 
     def exchange(self, keys: Sequence[int], parts: Sequence[Trimmed], least: float, most: int) -> bool:
         """Replace pieces by others, and find a place for their flaps.

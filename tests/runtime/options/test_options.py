@@ -184,6 +184,7 @@ def test_seams_have_a_price_a_bound_and_charts_may_be_as_many_as_pay() -> None:
         ({"charts": 0}, "charts is 0"),
         ({"charts": "some"}, "charts is 'some'"),
         ({"seam_price": 0.0}, "seam-price is 0.0"),
+        ({"page_price": -0.1}, "page-price is -0.1"),
         ({"max_stretch": 1.0}, "max-stretch is 1.0"),
         ({"max_stretch": 1.1, "preset": "paper"}, "max-stretch with preset paper"),
         ({"charts": "auto", "preset": "paper"}, "charts auto with preset paper"),

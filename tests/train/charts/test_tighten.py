@@ -11,10 +11,12 @@ pytest.importorskip("igl")
 
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
+from flexpara.runtime.process.deadline import never
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts import tighten
-from flexpara.train.charts.tighten import back_on
-from flexpara.train.config import FinishConfig
+from flexpara.train.charts.objective import search_cost, wasted
+from flexpara.train.charts.tighten import back_on, closed
+from flexpara.train.config import FinishConfig, PageConfig
 from flexpara.train.search.labels import dual_graph
 from flexpara.train.search.search import Search
 
@@ -68,3 +70,40 @@ def test_of_ways_of_many_charts_and_of_much_stretch_both_are_settled(led: dict[f
 def test_where_no_way_can_be_led_labels_are_what_is_left(led: dict[float, Search | None]) -> None:
     led |= dict.fromkeys(CONFIG.carry.winding)
     assert counts(bowl(1), 1) == [4]
+
+
+def striped(charts: int, page: PageConfig) -> Search:
+    """A torus of area 1 in sectors along its ring."""
+    whole = Surface(*make_sample("torus", resolution=16))
+    surface = Surface(whole.vertices / np.sqrt(whole.face_areas().sum()), whole.faces)
+    config = FinishConfig(page=page)
+    x, y, _ = surface.triangles.mean(axis=1).T
+    label = ((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * charts).astype(np.int64)
+    search = Search(surface, dual_graph(surface, edge_table(surface.faces), config.labels.seams), config)
+    search.add_all_valid([(np.flatnonzero(label == value), ()) for value in range(charts)])
+    return search
+
+
+@pytest.mark.parametrize("page", [0.0, 0.01])
+def test_a_higher_limit_on_charts_costs_no_more(page: float) -> None:
+    search = striped(8, PageConfig(price=page))
+    ways = [closed(search, charts, 16, never) for charts in (1, 2, 4, 8, 16)]
+    assert all(len(way.found.pieces) <= charts for way, charts in zip(ways, (1, 2, 4, 8, 16), strict=True))
+    cost = np.array([search_cost(way.found) for way in ways])
+    assert (cost[1:] <= cost[:-1] * search.config.page.near).all()
+    assert not ways[-1].forced
+
+
+def test_what_more_than_pays_is_closed_for_few_charts_alone() -> None:
+    search = striped(8, PageConfig(price=0.2))
+    assert len(closed(search, 8, 16, never).found.pieces) > 1
+    one = closed(search, 1, 16, never)
+    assert one.forced
+    assert len(one.found.pieces) == 1
+
+
+def test_a_free_page_costs_nothing_and_neither_does_it_where_stretch_is_bounded() -> None:
+    pieces = list(striped(2, PageConfig()).pieces.values())
+    assert wasted(pieces, FinishConfig()) > 0.0
+    assert wasted(pieces, FinishConfig(page=PageConfig(price=0.0))) == 0.0
+    assert wasted(pieces, FinishConfig(stretch=0.02)) == 0.0

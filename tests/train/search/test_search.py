@@ -106,6 +106,16 @@ def test_a_split_gains_what_the_objective_says() -> None:
     assert_valid(search)
 
 
+def test_a_chart_costs_the_room_between_it_and_its_convex_hull() -> None:
+    corner = np.array([[x, y, 0.0] for y in range(3) for x in range(3)], dtype=np.float64)
+    square = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7], [3, 7, 6]])  # three of four: an L
+    surface = Surface(corner[:8] / np.sqrt(3.0), square)
+    search = search_of(surface, np.zeros(6, dtype=np.int64))
+    (piece,) = search.pieces.values()
+    hull = CONFIG.page.price * CONFIG.page.hull
+    assert search.cost_of(piece) - piece.cost(search.price) == pytest.approx(hull * 0.5 / 3.0, rel=1e-4)
+
+
 def test_a_pair_is_flattened_once(monkeypatch: pytest.MonkeyPatch) -> None:
     tube = unit("tube", 24)
     search = search_of(tube, bands(tube, 3))
@@ -126,7 +136,8 @@ def test_what_curvature_foretells_of_a_merge_orders_what_flattening_finds() -> N
     search = search_of(sphere, bands(sphere, 6))
     pairs = list(search.borders())
     search.try_merges(pairs)
-    found = [(search.foretell(pair)[0], search.cost(merged)) for pair in pairs if (merged := search.tried[pair])]
+    merged = [(pair, search.tried[pair]) for pair in pairs]
+    found = [(search.foretell(pair)[0], each.piece.cost(search.price)) for pair, each in merged if each is not None]
     foretold, cost = np.array(found).T
     assert np.corrcoef(np.argsort(np.argsort(foretold)), np.argsort(np.argsort(cost)))[0, 1] > 0.5
 
