@@ -171,9 +171,15 @@ class PageConfig:
     hull: float = 1.0
     """Share of that price at which the room between a chart and its convex hull counts while a search goes on."""
     tries: int = 16
-    """Seams that may be tried to be closed on the proxy where there are few enough charts …"""
+    """Seams that may be tried to be closed on the proxy where that pays …"""
+    tries_down: int = 24
+    """… on the way to fewer charts …"""
     tries_fewer: int = 60
-    """… and where fewer are asked for."""
+    """… and, in each round, where fewer are asked for."""
+    rounds: int = 3
+    """Such rounds."""
+    valley: float = 1.04
+    """Objective of a state, as a multiple of the best one's, beyond which fewer charts have to be asked for."""
     near: float = 1.02
     """Objective of a state, as a multiple of the best one's, up to which it is taken where it has fewer charts."""
     far: float = 1.1

@@ -57,11 +57,14 @@ def closed(search: Search, charts: int, tries: int, late: Late) -> Way:
 
     def enough() -> bool:
         cost.extend(search_cost(state) for state in work.seen[len(cost) - 1 :])
-        return late() or (len(work.search.pieces) <= charts and cost[-1] > page.near * min(cost))
+        return late() or (len(work.search.pieces) <= charts and cost[-1] > page.valley * min(cost))
 
     work.close(config.slit.price, tries)
     work.bounds, work.late = Bounds(1, config.most_excess), enough
-    work.close(config.slit.price, tries if len(work.search.pieces) <= charts else page.tries_fewer)
+    work.close(config.slit.price, page.tries_down if tries else 0)
+    for _ in range(page.rounds):
+        if len(work.search.pieces) > charts and not late():
+            work.close(config.slit.price, page.tries_fewer)
     seen = [search, *work.seen]
     enough()
     few = [n for n, state in enumerate(seen) if len(state.pieces) <= charts] or [len(seen) - 1]
@@ -84,13 +87,7 @@ def led_back(surface: Surface, coarse: Surface, way: Way, charts: int, config: F
     Where closed seams do not come back as what they were, what they were closed from is another.
     """
     if way.forced:
-        led = back_on(surface, coarse, way.found, charts, config)
-        by_network = len(led) == 1 and led[0].objective() <= way.found.objective()
-        return (
-            [*led, carried_back(surface, coarse, way.found, charts, config)]
-            if by_network and not config.stretch
-            else led
-        )
+        return back_on(surface, coarse, way.found, charts, config)
     led = [carried_back(surface, coarse, way.found, charts, config)]
     if way.before is not way.found and search_cost(led[0]) > search_cost(way.before):
         led.append(carried_back(surface, coarse, way.before, charts, config))
