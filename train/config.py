@@ -80,8 +80,9 @@ class ShortenConfig:
 
     full: float = 0.5
     """Share of a page that charts are expected to cover: one that needs more of a page costs something."""
-    worth: float = 0.005
-    """What a page e times as large costs, as objective: one half as full counts like a seam of 1.2 × √area."""
+    worth: float = 0.5
+    """What a page e times as large costs, as a multiple of the page's price: by default one half as full counts like a
+    seam of 1.2 × √area."""
     smooth: float = 3.0
     """How many times what it costs elsewhere a cut costs where nobody expects one: where the surface is flat …"""
     exact: float = 1e-6
@@ -168,6 +169,8 @@ class PageConfig:
 
     price: float = 0.01
     """Mean excess energy that an empty page would cost: half of it, where charts cover half.  0: the page is free."""
+    free: bool = False
+    """Whether the search leaves the page out, as it does where fewer charts are asked for than it aims at."""
     hull: float = 1.0
     """Share of that price at which the room between a chart and its convex hull counts while a search goes on."""
     tries: int = 16
@@ -175,9 +178,7 @@ class PageConfig:
     tries_down: int = 24
     """… on the way to fewer charts …"""
     tries_fewer: int = 60
-    """… and, in each round, where fewer are asked for."""
-    rounds: int = 3
-    """Such rounds."""
+    """… and where fewer are asked for, or the page is free."""
     valley: float = 1.04
     """Objective of a state, as a multiple of the best one's, beyond which fewer charts have to be asked for."""
     near: float = 1.02
@@ -301,8 +302,8 @@ class FinishConfig:
 
     @property
     def page_price(self) -> float:
-        """What an empty page costs: nothing where the shortest seams are asked for."""
-        return 0.0 if self.stretch else self.page.price
+        """What an empty page costs: nothing where the shortest seams are asked for, or few charts."""
+        return 0.0 if self.stretch or self.page.free else self.page.price
 
     @property
     def hull_price(self) -> float:

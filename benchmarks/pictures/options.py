@@ -43,6 +43,7 @@ RUMP = 0.45
 SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
     "charts": ("spot", ({"charts": 1}, {"charts": 16})),
     "seam-price": ("spot", ({"seam_price": 0.0005}, {"seam_price": 0.003}, {"seam_price": 0.02})),
+    "page-price": ("rocker-arm", ({"page_price": 0.0}, {"page_price": 0.01}, {"page_price": 0.03})),
     "max-stretch": ("spot", ({"max_stretch": 1.005}, {"max_stretch": 1.02}, {"max_stretch": 1.1})),
     "seed": ("spot", ({"seed": 0}, {"seed": 1}, {"seed": 2})),
     "seams": ("rocker-arm", ({"seams": "short"}, {"seams": "hidden"}, {"seams": "crease"})),

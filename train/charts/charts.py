@@ -149,6 +149,7 @@ def chart_surface(
     Raises:
         FinishError: the result failed the exact check (a defect).
     """
+    config = replace(config, page=replace(config.page, free=charts < config.closing.charts))
     haste = Haste(stage.deadline, len(surface.faces), config.haste)
     late = haste.late
     if haste.is_hopeless(len(surface.faces)):

@@ -46,9 +46,9 @@ def wasted(pieces: list[Piece], config: FinishConfig) -> float:
     return config.page_price * (1.0 - foreseen(shapes, page))
 
 
-def search_cost(search: Search) -> float:
+def search_cost(search: Search, config: FinishConfig) -> float:
     """The objective of a search, page included."""
-    pieces, config = list(search.pieces.values()), search.config
+    pieces = list(search.pieces.values())
     plain = sum(piece.cost(search.price) for piece in pieces) + search.price * sum(search.borders().values())
     return plain + wasted(pieces, config)
 

@@ -80,14 +80,15 @@ def page_side(points: Corners) -> float:
     return float(min(sides.max(), sides.sum() / np.sqrt(2.0)))
 
 
-def waste(side: float, page: Page, config: ShortenConfig) -> float:
+def waste(side: float, page: Page, config: FinishConfig) -> float:
     """What a chart of that page side costs, as objective: nothing where others fill the page beside it."""
-    return config.worth * max(float(np.log(config.full * (side / page.side) ** 2)), 0.0)
+    price, full = config.shorten.worth * config.page.price, config.shorten.full
+    return price * max(float(np.log(full * (side / page.side) ** 2)), 0.0)
 
 
 def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut | None:
     """The cut of most gain into at most ``room`` parts, among a few directions and places; None where none pays."""
-    before = waste(page_side(piece.flat.uv), page, config.shorten)
+    before = waste(page_side(piece.flat.uv), page, config)
     if before <= 0.0:
         return None
     flat = piece.flat.surface
@@ -104,7 +105,7 @@ def best_cut(piece: Piece, page: Page, room: int, config: FinishConfig) -> Cut |
         outer[graph.pairs[across].reshape(-1)] = True
         sides = [page_side(corners[outer & (part == each)]) for each in np.unique(part[outer])]
         seam = float(graph.length[across].sum())
-        return Cut(part, before - waste(max(sides), page, config.shorten) - price * seam)
+        return Cut(part, before - waste(max(sides), page, config) - price * seam)
 
     places = list(straight_cuts(corners, polygon, config.shorten))
     straight = [cut((place > 0.0).astype(np.int64)) for place in places]

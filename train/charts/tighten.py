@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Way(NamedTuple):
     """A state of a search on the proxy that is laid out on the surface.
 
-    before: the state that seams were closed from.  forced: more were closed than pay, for fewer charts or short seams.
+    before: the state that seams were closed from.  forced: fewer charts or short seams alone were asked for.
     """
 
     found: Search
@@ -37,11 +37,12 @@ def way_down(search: Search, charts: int, starts: Starts) -> Way:
     crowded = len(search.pieces) - charts > config.start.crowded
     if late():
         return Way(search, search)
-    if config.stretch:
+    few = config.stretch > 0.0 or (config.page.free and not crowded and len(search.pieces) > charts)
+    if few:
         search = tightened(search, charts, config, late)
     straight = search if starts.holed else straightened(search, config.bands)
-    if config.stretch or crowded:
-        return Way(straight, straight, forced=not crowded)
+    if few or crowded or config.page.free:
+        return Way(straight, straight, forced=few)
     return closed(straight, charts, 0 if starts.small else config.page.tries, late)
 
 
@@ -52,24 +53,24 @@ def closed(search: Search, charts: int, tries: int, late: Late) -> Way:
     that costs little or is asked for: what is seen on the way to few charts is seen on the way to fewer.
     """
     config, page = search.config, search.config.page
-    cost = [search_cost(search)]
+    cost = [search_cost(search, config)]
     work = Closing(search.twin(), Bounds(len(search.pieces), config.most_excess), config.closing, late)
 
     def enough() -> bool:
-        cost.extend(search_cost(state) for state in work.seen[len(cost) - 1 :])
+        cost.extend(search_cost(state, config) for state in work.seen[len(cost) - 1 :])
         return late() or (len(work.search.pieces) <= charts and cost[-1] > page.valley * min(cost))
 
     work.close(config.slit.price, tries)
     work.bounds, work.late = Bounds(1, config.most_excess), enough
     work.close(config.slit.price, page.tries_down if tries else 0)
-    for _ in range(page.rounds):
-        if len(work.search.pieces) > charts and not late():
-            work.close(config.slit.price, page.tries_fewer)
+    if not late() and (len(work.search.pieces) > charts or (tries and not config.page_price)):
+        work.close(config.slit.price, page.tries_fewer)
     seen = [search, *work.seen]
     enough()
     few = [n for n, state in enumerate(seen) if len(state.pieces) <= charts] or [len(seen) - 1]
     free, found = (best_of([seen[n] for n in among], [cost[n] for n in among]) for among in (range(len(seen)), few))
-    return Way(found, search) if found is free else Way(with_straight_seams(found), search, forced=True)
+    forced = found is not search and (found is not free or not config.page_price)
+    return Way(with_straight_seams(found) if forced else found, search, forced)
 
 
 def best_of(states: list[Search], cost: list[float]) -> Search:
@@ -89,9 +90,9 @@ def led_back(surface: Surface, coarse: Surface, way: Way, charts: int, config: F
     if way.forced:
         return back_on(surface, coarse, way.found, charts, config)
     led = [carried_back(surface, coarse, way.found, charts, config)]
-    if way.before is not way.found and search_cost(led[0]) > search_cost(way.before):
+    if way.before is not way.found and search_cost(led[0], config) > search_cost(way.before, config):
         led.append(carried_back(surface, coarse, way.before, charts, config))
-    cost = [search_cost(search) for search in led]
+    cost = [search_cost(search, config) for search in led]
     return [search for search, each in zip(led, cost, strict=True) if each <= config.page.far * min(cost)]
 
 

@@ -89,9 +89,8 @@ def test_a_higher_limit_on_charts_costs_no_more(page: float) -> None:
     search = striped(8, PageConfig(price=page))
     ways = [closed(search, charts, 16, never) for charts in (1, 2, 4, 8, 16)]
     assert all(len(way.found.pieces) <= charts for way, charts in zip(ways, (1, 2, 4, 8, 16), strict=True))
-    cost = np.array([search_cost(way.found) for way in ways])
+    cost = np.array([search_cost(way.found, search.config) for way in ways])
     assert (cost[1:] <= cost[:-1] * search.config.page.near).all()
-    assert not ways[-1].forced
 
 
 def test_what_more_than_pays_is_closed_for_few_charts_alone() -> None:
@@ -106,4 +105,5 @@ def test_a_free_page_costs_nothing_and_neither_does_it_where_stretch_is_bounded(
     pieces = list(striped(2, PageConfig()).pieces.values())
     assert wasted(pieces, FinishConfig()) > 0.0
     assert wasted(pieces, FinishConfig(page=PageConfig(price=0.0))) == 0.0
+    assert wasted(pieces, FinishConfig(page=PageConfig(free=True))) == 0.0
     assert wasted(pieces, FinishConfig(stretch=0.02)) == 0.0
