@@ -175,13 +175,9 @@ class PageConfig:
     """Share of that price at which the room between a chart and its convex hull counts while a search goes on."""
     tries: int = 16
     """Seams that may be tried to be closed on the proxy where that pays …"""
-    tries_down: int = 24
-    """… on the way to fewer charts …"""
     tries_fewer: int = 60
     """… and where fewer are asked for, or the page is free."""
-    valley: float = 1.04
-    """Objective of a state, as a multiple of the best one's, beyond which fewer charts have to be asked for."""
-    near: float = 1.02
+    near: float = 1.01
     """Objective of a state, as a multiple of the best one's, up to which it is taken where it has fewer charts."""
     far: float = 1.1
     """Objective of charts carried back, as a multiple of the best ones', beyond which they are not laid out further."""

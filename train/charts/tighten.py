@@ -47,39 +47,29 @@ def way_down(search: Search, charts: int, starts: Starts) -> Way:
 
 
 def closed(search: Search, charts: int, tries: int, late: Late) -> Way:
-    """The best state of a search on its way down to one chart, as far as few enough are asked for.
+    """The best state of a search on its way down to few enough charts.
 
-    First every closing that pays is made, whatever the limit on charts, and then those that make fewer, as long as
-    that costs little or is asked for: what is seen on the way to few charts is seen on the way to fewer.
+    First closings that pay are made, whatever the limit on charts, so that all limits share them; then, where there are
+    still more or the page is free, those that make fewer.
     """
-    config, page = search.config, search.config.page
-    cost = [search_cost(search, config)]
+    config = search.config
     work = Closing(search.twin(), Bounds(len(search.pieces), config.most_excess), config.closing, late)
-
-    def enough() -> bool:
-        cost.extend(search_cost(state, config) for state in work.seen[len(cost) - 1 :])
-        return late() or (len(work.search.pieces) <= charts and cost[-1] > page.valley * min(cost))
-
     work.close(config.slit.price, tries)
-    work.bounds, work.late = Bounds(1, config.most_excess), enough
-    work.close(config.slit.price, page.tries_down if tries else 0)
     if not late() and (len(work.search.pieces) > charts or (tries and not config.page_price)):
-        work.close(config.slit.price, page.tries_fewer)
+        work.bounds = Bounds(charts, config.most_excess)
+        work.close(config.slit.price, config.page.tries_fewer)
     seen = [search, *work.seen]
-    enough()
-    few = [n for n, state in enumerate(seen) if len(state.pieces) <= charts] or [len(seen) - 1]
-    free, found = (best_of([seen[n] for n in among], [cost[n] for n in among]) for among in (range(len(seen)), few))
-    forced = found is not search and (found is not free or not config.page_price)
+    found = best_of([state for state in seen if len(state.pieces) <= charts] or seen[-1:])
+    forced = found is not search and not (config.page_price and found is best_of(seen))
     return Way(with_straight_seams(found) if forced else found, search, forced)
 
 
-def best_of(states: list[Search], cost: list[float]) -> Search:
+def best_of(states: list[Search]) -> Search:
     """The state of fewest charts among those that cost about as little as the best, the best of equals."""
-    most = states[0].config.page.near * min(cost)
-    near = [
-        (len(state.pieces), each, n) for n, (state, each) in enumerate(zip(states, cost, strict=True)) if each <= most
-    ]
-    return states[min(near)[-1]]
+    config = states[0].config
+    ranked = [(len(state.pieces), search_cost(state, config), n) for n, state in enumerate(states)]
+    most = config.page.near * min(cost for _, cost, _ in ranked)
+    return states[min(each for each in ranked if each[1] <= most)[-1]]
 
 
 def led_back(surface: Surface, coarse: Surface, way: Way, charts: int, config: FinishConfig) -> list[Search]:

@@ -64,7 +64,7 @@ def test_a_border_with_teeth_becomes_straight_and_each_chart_stays_valid() -> No
 
 
 def test_where_seams_cost_nothing_none_is_moved_for_its_length() -> None:
-    config = replace(CONFIG, slit=replace(CONFIG.slit, price=1e-12))
+    config = replace(CONFIG, slit=replace(CONFIG.slit, price=1e-12), page=replace(CONFIG.page, price=0.0))
     search = bent_sheet(12)
     free = Search(search.surface, search.graph, config)
     for piece in search.pieces.values():
