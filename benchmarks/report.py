@@ -18,7 +18,7 @@ from PIL import Image
 
 from flexpara.__main__ import main as flexpara
 
-BROWSER = Path(__file__).resolve().parents[1] / "tests" / "browser.py"
+BROWSER = Path(__file__).resolve().parents[1] / "tests" / "helpers" / "browser.py"
 DRAWN = "Number(document.documentElement?.dataset.drawn) > 0"
 WIDTH, HEIGHT = 1300, 1000
 QUALITY = 80

@@ -9,11 +9,12 @@ from __future__ import annotations
 import os
 from collections import Counter
 from dataclasses import asdict
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from house import write_house
+from standins import FACTS, write_standins
 
 import flexpara.train  # noqa: F401  # before torch, whose threads it tells how to wait
 from flexpara.runtime.samples import make_sample
@@ -57,30 +58,20 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
         terminalreporter.write_line(f"{len(skipped)} tests were skipped: {told}")
 
 
-def sibling(name: str) -> Any:
-    """A helper module beside this file; tests are no package."""
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="session")
 def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of real meshes, or of made ones of the same names and kinds where that is absent."""
     if MODELS.is_dir():
         return MODELS
     folder = tmp_path_factory.mktemp("standins")
-    sibling("standins").write_standins(folder)
+    write_standins(folder)
     return folder
 
 
 @pytest.fixture
 def house(tmp_path: Path) -> Path:
     """An OBJ file of two quads on half of a texture: the first red, the second blue."""
-    return sibling("house").write_house(tmp_path)
+    return write_house(tmp_path)
 
 
 @pytest.fixture(scope="session")
@@ -106,7 +97,7 @@ def facts(models: Path) -> dict[str, tuple[int, dict[str, int]]]:
         "fandisk": (12946, {}),
         "suzanne": (968, {"welded_vertices": 2, "coincident_faces": 2, "components": 5}),
     }
-    return real if models == MODELS else sibling("standins").FACTS
+    return real if models == MODELS else FACTS
 
 
 @pytest.fixture

@@ -11,13 +11,12 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import threading
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+import browser
 import numpy as np
 import onnxruntime
 import pytest
@@ -40,20 +39,6 @@ CARGO = '[package]\nname = "ask"\nversion = "0.1.0"\nedition = "2021"\n[dependen
 WEB = pytest.mark.skipif(
     not (MODULES / "onnxruntime-web").is_dir(), reason="npm package onnxruntime-web is not installed: scripts/test"
 )
-
-
-def _browser() -> Any:
-    """tests/browser.py, which is no part of a package."""
-    spec = spec_from_file_location("browser", Path(__file__).with_name("browser.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-browser = _browser()
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +95,7 @@ def address(place: Path) -> Iterator[str]:
 def test_javascript_in_a_page(known: tuple[Path, np.ndarray], place: Path, address: str) -> None:
     (place / "ask.html").write_text(BLOCKS["html"], encoding="utf-8")
     (place / "node_modules").symlink_to(MODULES.resolve())
-    with browser.started(browser.find_browser(), place / "profile") as page:
+    with browser.started(browser.find_browser() or "", place / "profile") as page:
         page.open(f"{address}/ask.html")
         page.wait("!document.querySelector('output').value.startsWith('asking')")
         np.testing.assert_allclose(numbers(page.run("document.querySelector('output').value")), known[1], atol=1e-5)

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
+from scenefile import whole_scene
 
 from flexpara.__main__ import main
 from flexpara.runtime.io.meshfile import load_asset
 
 QUICK = ["--size", "64", "--maps", "none", "--no-preview"]
-
-
-def _helper(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def tree_of(path: Path) -> dict[str, Any]:
@@ -33,7 +23,7 @@ def tree_of(path: Path) -> dict[str, Any]:
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     path = tmp_path / "scene.glb"
-    path.write_bytes(_helper("scenefile").whole_scene().glb())
+    path.write_bytes(whole_scene().glb())
     return path
 
 
@@ -70,7 +60,7 @@ def test_what_obj_cannot_hold_is_said_line_by_line(
 def test_a_texture_that_cannot_be_decoded_is_refused_or_stays(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], instant_training: list[object]
 ) -> None:
-    made = _helper("scenefile").whole_scene()
+    made = whole_scene()
     made.tree["textures"][0] = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
     made.tree["images"][0]["mimeType"] = "image/ktx2"
     path = tmp_path / "scene.glb"

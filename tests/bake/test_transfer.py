@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import textured
 
 from flexpara.bake.baker import bake
 from flexpara.bake.colors.color import srgb_exact
@@ -24,17 +23,6 @@ from flexpara.runtime.mesh import Asset, Atlas
 MakeGBuffer = Callable[[Atlas, int], GBuffer]
 
 
-def _sibling(name: str) -> Any:
-    """A helper module beside this file; tests are no package."""
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-textured = _sibling("textured")
 SIZE = 256
 BAR = 40.0
 

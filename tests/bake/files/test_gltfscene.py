@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import shutil
 import subprocess
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pygltflib
 import pytest
 import trimesh
+from scenefile import whole_scene
 from trimesh.exchange.gltf import export_glb
 from trimesh.visual import TextureVisuals
 
@@ -27,18 +26,6 @@ HERE = Path(__file__).parent
 UNTOUCHED = ("scene", "scenes", "nodes", "skins", "animations", "cameras", "extensions", "extensionsUsed")
 NUMPY_TYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-
-
-def _helper(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, HERE.parents[1] / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-scenefile = _helper("scenefile")
 
 
 def shattered(asset: Asset) -> Atlas:
@@ -102,7 +89,7 @@ def assert_valid(path: Path) -> None:
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     path = tmp_path / "source.glb"
-    path.write_bytes(scenefile.whole_scene().glb())
+    path.write_bytes(whole_scene().glb())
     return path
 
 
@@ -195,7 +182,7 @@ def test_a_primitive_without_material_gets_one_without_which_trimesh_passes_over
 
 
 def test_variants_keep_their_materials_and_their_pictures_on_the_old_uv(source: Path) -> None:
-    scene = scenefile.whole_scene()
+    scene = whole_scene()
     primitive = scene.tree["meshes"][1]["primitives"][0]
     primitive["material"] = 1
     mappings = [{"material": 0, "variants": [0]}, {"material": 1, "variants": [1]}]
@@ -235,7 +222,7 @@ def test_a_gltf_file_has_its_buffer_beside_it(source: Path) -> None:
 
 
 def test_a_mesh_that_only_mirrors_keeps_its_winding_in_the_file(tmp_path: Path) -> None:
-    scene = scenefile.whole_scene()
+    scene = whole_scene()
     scene.tree["nodes"][0]["children"] = [3]
     path = tmp_path / "source.glb"
     path.write_bytes(scene.glb())

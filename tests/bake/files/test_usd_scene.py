@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from scenefile import whole_scene
 
 from flexpara.bake.files.usd import write_usda
 from flexpara.bake.files.usdmaterial import distinct
@@ -18,15 +17,6 @@ from flexpara.bake.files.written import PartUv, Reading, corner_uv_of
 from flexpara.runtime.io.meshfile import load_asset
 from flexpara.runtime.mesh import Asset, Atlas
 from flexpara.runtime.pack.packing import atlas_from_uv
-
-
-def _helper(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[2] / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def pxr(name: str) -> Any:
@@ -57,7 +47,7 @@ def staged(source: Path) -> tuple[Asset, list[Shape], Any]:
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     path = tmp_path / "scene.glb"
-    path.write_bytes(_helper("scenefile").whole_scene().glb())
+    path.write_bytes(whole_scene().glb())
     return path
 
 
@@ -133,7 +123,7 @@ def test_what_is_read_back_is_what_was_written(scene: Path) -> None:
 
 
 def test_a_mesh_that_only_mirrors_keeps_its_winding_in_the_file(scene: Path) -> None:
-    made = _helper("scenefile").whole_scene()
+    made = whole_scene()
     made.tree["nodes"][0]["children"] = [3]
     scene.write_bytes(made.glb())
     _, shapes, stage = staged(scene)
@@ -162,7 +152,7 @@ def test_objects_of_an_obj_file_are_meshes_and_its_polygons_stay(tmp_path: Path)
 
 
 def test_names_that_are_no_identifiers_are_kept_beside_them(scene: Path) -> None:
-    made = _helper("scenefile").whole_scene()
+    made = whole_scene()
     made.tree["nodes"][1]["name"] = 'Würfel "2"\n'
     made.tree["materials"][0]["name"] = "Öl"
     scene.write_bytes(made.glb())

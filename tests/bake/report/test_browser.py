@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import browser
 import pytest
+from resultfolder import EVIL, OBJ, write_result
 
 from flexpara.bake.report.gather import results_in
 from flexpara.bake.report.page import html_of
@@ -16,18 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-def _sibling(path: Path) -> Any:
-    """A helper module; tests are no package."""
-    spec = spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-browser = _sibling(Path(__file__).parents[2] / "browser.py")
-made = _sibling(Path(__file__).with_name("conftest.py"))
 PROGRAM = browser.find_browser()
 pytestmark = [
     pytest.mark.skipif(PROGRAM is None, reason="no Chromium found: apt-get install chromium, or name it in $CHROMIUM"),
@@ -44,9 +32,9 @@ READOUT = "document.getElementById('readout').textContent"
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A browser at the report of two results of the same mesh."""
     folder = tmp_path_factory.mktemp("report")
-    first, second = made.write_result(folder / "a"), made.write_result(folder / "b")
+    first, second = write_result(folder / "a"), write_result(folder / "b")
     path = folder / "report.html"
-    path.write_text(html_of(results_in([first, second]), made.EVIL), encoding="utf-8")
+    path.write_text(html_of(results_in([first, second]), EVIL), encoding="utf-8")
     assert PROGRAM is not None
     with browser.started(PROGRAM, folder / "profile") as found:
         found.open(path.as_uri())
@@ -78,7 +66,7 @@ def test_nothing_is_requested_complained_of_or_run_that_is_not_ours(page: Any) -
     assert sum(address.startswith("file:") for address in page.requests) == 1
     assert page.complaints == []
     assert page.run("typeof hacked") == "undefined"
-    assert page.run("document.title").startswith(made.EVIL)
+    assert page.run("document.title").startswith(EVIL)
     assert page.run("document.images.length") == 0
 
 
@@ -141,7 +129,7 @@ def test_everything_can_be_done_by_keys_and_has_a_name(page: Any) -> None:
     assert unnamed == []
 
 
-@pytest.mark.parametrize(("look", "pane", "color"), [("plain", 1, (204, 204, 204)), (made.EVIL, 1, (200, 30, 30))])
+@pytest.mark.parametrize(("look", "pane", "color"), [("plain", 1, (204, 204, 204)), (EVIL, 1, (200, 30, 30))])
 def test_a_look_is_the_colour_of_its_pixels(look: str, pane: int, color: tuple[int, ...], page: Any) -> None:
     """A map is seen where its uv are: the left half of the picture is red."""
     page.run("document.querySelector('[name=seams]').checked = false")
@@ -166,7 +154,7 @@ def choose(page: Any, look: str) -> None:
 def folded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A browser at the report of one result: its third triangle is turned over and lies on the second."""
     folder = tmp_path_factory.mktemp("folded")
-    made.write_result(folder / "a", obj=made.OBJ.replace("vt 0.6 0.7", "vt 0.85 0.2"))
+    write_result(folder / "a", obj=OBJ.replace("vt 0.6 0.7", "vt 0.85 0.2"))
     path = folder / "report.html"
     path.write_text(html_of(results_in([folder / "a"]), "folded"), encoding="utf-8")
     assert PROGRAM is not None
@@ -207,7 +195,7 @@ def test_flips_and_overlap_are_marked_where_they_are_and_counted(folded: Any) ->
 
 
 def test_a_mip_level_is_what_a_texture_has_left_there(folded: Any) -> None:
-    choose(folded, made.EVIL)
+    choose(folded, EVIL)
     assert seen(folded, 0.25, 0.3) == pytest.approx([200, 30, 30], abs=6)
     mark(folded, level=6)  # of 64 texels: one is left, half red and half black
     assert seen(folded, 0.25, 0.3)[0] < 160

@@ -3,30 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
 
+import browser
 import numpy as np
 import pytest
 from PIL import Image
 
 from flexpara.runtime.batch.manifest import Entry
 from flexpara.runtime.batch.status import Status, write_page
-
-HELPER = Path(__file__).resolve().parents[2] / "browser.py"
-
-
-def helper() -> Any:
-    spec = spec_from_file_location("browser", HELPER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-browser = helper()
 
 
 def entries(folder: Path) -> list[Entry]:
@@ -45,7 +30,7 @@ def entries(folder: Path) -> list[Entry]:
 def test_a_click_on_a_head_sorts(tmp_path: Path) -> None:
     page = write_page(tmp_path, Status(4, entries(tmp_path)))
     names = "[...document.querySelectorAll('tbody tr')].map(row => row.cells[1].textContent[0]).join('')"
-    with browser.started(browser.find_browser(), tmp_path / "profile") as opened:
+    with browser.started(browser.find_browser() or "", tmp_path / "profile") as opened:
         opened.open(page.as_uri())
         assert opened.run(names) == "bcad"
         click = "[...document.querySelectorAll('th button')].find(head => head.textContent === '{}').click()"

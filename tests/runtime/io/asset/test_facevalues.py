@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scenefile import Scene
 
 from flexpara.runtime.errors import InputError, MissingFileError
 from flexpara.runtime.io.asset.facevalues import face_values, read_points
@@ -14,7 +15,6 @@ from flexpara.runtime.io.asset.wantedseams import wanted_seams
 from flexpara.runtime.io.meshfile import asset_from_arrays, load_asset
 from flexpara.runtime.mesh import Asset
 from flexpara.runtime.options.seams import SeamOptions
-from tests.scenefile import Scene
 
 SQUARES = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]]
 FACES = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+from scenefile import whole_scene
 
 from flexpara.runtime.io.asset.changes import lost, told
 from flexpara.runtime.io.meshfile import load_asset
@@ -14,19 +13,10 @@ from flexpara.runtime.mesh import Asset
 from flexpara.runtime.options.unwrap import Outputs
 
 
-def _helper(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[2] / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
 def scene(tmp_path: Path) -> Asset:
     path = tmp_path / "scene.glb"
-    path.write_bytes(_helper("scenefile").whole_scene().glb())
+    path.write_bytes(whole_scene().glb())
     return load_asset(path)
 
 
@@ -64,7 +54,7 @@ def test_a_picture_that_a_map_is_baked_of_is_not_lost(scene: Asset) -> None:
 
 
 def test_a_primitive_that_gets_a_material_is_counted_and_not_complained_of(tmp_path: Path) -> None:
-    made = _helper("scenefile").whole_scene()
+    made = whole_scene()
     del made.tree["meshes"][1]["primitives"][0]["material"]
     path = tmp_path / "plain.glb"
     path.write_bytes(made.glb())

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
+from scenefile import whole_scene
 
 from flexpara.runtime.io.gltf.instances import every_instance, instance_faces
 from flexpara.runtime.io.loops import first_faces, loops_of
@@ -17,19 +16,10 @@ from flexpara.runtime.io.obj.write import write_obj
 from flexpara.runtime.pack.packing import atlas_from_uv
 
 
-def _helper(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[2] / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     path = tmp_path / "scene.glb"
-    path.write_bytes(_helper("scenefile").whole_scene().glb())
+    path.write_bytes(whole_scene().glb())
     return path
 
 
@@ -74,7 +64,7 @@ def test_a_mesh_without_materials_has_one_for_its_picture_alone() -> None:
 
 
 def test_names_of_two_lines_stay_on_one(source: Path) -> None:
-    made = _helper("scenefile").whole_scene()
+    made = whole_scene()
     made.tree["materials"][0]["name"] = "Pa\nint  2"
     made.tree["nodes"][1]["name"] = "A\nf 1 1 1"
     source.write_bytes(made.glb())
