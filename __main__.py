@@ -240,12 +240,7 @@ def _perform(run: Run, console: Console, *, summary: bool = True) -> int:
     run.forget()
     if stale:
         console.note(f"{source.stem}: of an earlier run, whose uv may be others: {', '.join(stale)}")
-    for facts in result.reports:
-        console.notes(facts["train"])
-        if summary:
-            page = {"page": facts["source"]["stem"]} if len(result.reports) > 1 else {}
-            page |= {"connected_parts": parts} if (parts := facts["changes"].get("components")) else {}
-            console.show({**page, **facts["metrics"], **facts["network"]}, ())
+    console.figures(result.reports, shown=summary)
     console.show({}, written if summary else ())
     return 0
 

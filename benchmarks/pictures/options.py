@@ -57,6 +57,7 @@ SHOWN: Mapping[str, tuple[str, tuple[dict[str, Any], ...]]] = {
     "cut": ("spot", ({"charts": 1}, {"charts": 1, "cut": "back.txt"})),
     "crease-angle": ("fandisk", ({"crease_angle": 5}, {"crease_angle": 30}, {"crease_angle": 120})),
     "padding": ("spot", ({"padding": 1}, {"padding": 8}, {"padding": 32})),
+    "texel-density": ("spot", ({"texel_density": 40}, {"texel_density": 80})),
     "rotation": ("fandisk", ({"rotation": "off"}, {"rotation": "90"}, {"rotation": "any"})),
     "stack": ("brackets.ply", ({"stack": "off"}, {"stack": "identical"}, {"stack": "mirrored"})),
     "pages": ("suzanne", ({"pages": 3},)),

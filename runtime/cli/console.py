@@ -87,6 +87,15 @@ class Console:
         for fact in report.get("notes", ()):
             self.note(str(fact))
 
+    def figures(self, reports: Sequence[Mapping[str, Any]], *, shown: bool) -> None:
+        """The notes of the report of each atlas; shown: its figures too."""
+        for report in reports:
+            self.notes(report["train"])
+            if shown:
+                page = {"page": report["source"]["stem"]} if len(reports) > 1 else {}
+                page |= {"connected_parts": parts} if (parts := report["changes"].get("components")) else {}
+                self.show({**page, **report["metrics"], **report["network"]}, ())
+
     @contextmanager
     def progress(self) -> Iterator[Progress | None]:
         """Around work: its progress bars, and warnings of ours as notes; when quiet no bars and no warnings at all."""
