@@ -131,6 +131,14 @@ static void define_pieces(py::module_& module) {
             py::gil_scoped_release free;
             return Slim(vertices, corners, std::move(start));
         }))
+        .def(py::init([](const Numbers& points, const Indices& faces, const Numbers& uv, const Indices& scaffold, double weight) {
+            auto vertices = points_of(points);
+            auto corners = faces_of(checked(faces, std::min(points.shape(0), uv.shape(0))));
+            auto around = faces_of(checked(scaffold, uv.shape(0)));
+            std::vector<double> start(uv.data(), uv.data() + uv.size());
+            py::gil_scoped_release free;
+            return Slim(vertices, corners, std::move(start), around, weight);
+        }))
         .def("pin", &Slim::pin)
         .def("run", [](Slim& slim, int iterations) {
             {
@@ -301,7 +309,7 @@ static void define_clouds(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 7;
+    module.attr("edition") = 8;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);

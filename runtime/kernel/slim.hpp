@@ -13,10 +13,13 @@ namespace flexpara {
 
 class Slim {
    public:
-    Slim(const Points3& points, const Faces& faces, std::vector<double> uv) : faces_(faces), uv_(std::move(uv)),
-        rest_(rest_shapes(points, faces)), system_(int(points.size()), links(faces)), step_(uv_.size()) {
-        slots_.reserve(faces.size());
-        for (const auto& face : faces) {
+    // scaffold: faces of the plane around the piece, at rest as they lie; each counts like `weight` of area.
+    Slim(const Points3& points, const Faces& faces, std::vector<double> uv, const Faces& scaffold = {}, double weight = 0.0) :
+        faces_(joined(faces, scaffold)), uv_(std::move(uv)), rest_(rest_shapes(points, faces)),
+        system_(int(uv_.size() / 2), links(faces_)), step_(uv_.size()) {
+        if (!scaffold.empty()) hold(scaffold, weight);
+        slots_.reserve(faces_.size());
+        for (const auto& face : faces_) {
             std::array<int, 6> slot{};
             for (int i = 0, at = 0; i < 3; ++i)
                 for (int j = i; j < 3; ++j) slot[at++] = system_.slot(face[i], face[j]);
@@ -50,6 +53,20 @@ class Slim {
     static constexpr double kShy = 0.8;         // share of the way to the first flip
     static constexpr int kHalvings = 12;        // tries of a step, each half as long
     static constexpr double kIsometric = 1e-8;  // a singular value this close to 1 gets the weight 1
+
+    static Faces joined(Faces faces, const Faces& others) {
+        faces.insert(faces.end(), others.begin(), others.end());
+        return faces;
+    }
+
+    void hold(const Faces& scaffold, double weight) {
+        Points3 plane(uv_.size() / 2);
+        for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = {uv_[2 * i], uv_[2 * i + 1], 0.0};
+        for (const auto& face : scaffold) {
+            rest_.push_back(rest_shape(plane, face));
+            rest_.back().area = weight;
+        }
+    }
 
     static std::vector<std::pair<int, int>> links(const Faces& faces) {
         std::vector<std::pair<int, int>> found;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...runtime.process.deadline import Late, never
@@ -10,6 +11,7 @@ from ..carry.carry import carried_back
 from ..carry.network import network_carried
 from ..carry.straighten import straightened
 from ..seams.closing import Bounds, Closing
+from ..seams.growing import as_one_chart, grown, opened_to
 from ..workers import parallel_map
 from .objective import rank, search_cost
 
@@ -39,7 +41,8 @@ def way_down(search: Search, charts: int, starts: Starts) -> Way:
         return Way(search, search)
     few = config.stretch > 0.0 or (config.page.free and not crowded and len(search.pieces) > charts)
     if few:
-        search = tightened(search, charts, config, late)
+        thinner = len(search.surface.faces) < len(starts.part.surface.faces)
+        search = tightened(search, charts, config, late, proxy=thinner)
     straight = search if starts.holed else straightened(search, config.bands)
     if few or crowded or config.page.free:
         return Way(straight, straight, forced=few)
@@ -86,16 +89,77 @@ def led_back(surface: Surface, coarse: Surface, way: Way, charts: int, config: F
     return [search for search, each in zip(led, cost, strict=True) if each <= config.page.far * min(cost)]
 
 
-def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
-    """The search with seams closed as far as the bounds on charts and stretch ask for it, and where that pays."""
+def tightened(search: Search, charts: int, config: FinishConfig, late: Late = never, *, proxy: bool = False) -> Search:
+    """The search with seams closed as far as the bounds on charts and stretch ask for it, and where that pays.
+
+    Where stretch is asked for, seams grown are tried too, and from then on scaffolds hold charts apart.  On a proxy,
+    stretch may be some more: the surface itself is stretched less.
+    """
     closing, price = config.closing, config.slit.price
-    bounds = Bounds(charts, config.stretch or config.most_excess)
-    if config.stretch:
-        opened_up(search, bounds.excess, config, late)
-    Closing(search, bounds, closing, late).close(price, closing.tries)
-    if not late():
-        search = with_straight_seams(search)
-    return spent(search, bounds, config, closing.tries_dearer, late) if config.stretch else search
+    if not config.stretch:
+        Closing(search, Bounds(charts, config.most_excess), closing, late).close(price, closing.tries)
+        return search if late() else with_straight_seams(search)
+    found, loose = search.twin(), config.stretch * (closing.growing.proxy if proxy else 1.0)
+    found.config = replace(config, stretch=loose)
+    found = opened_and_closed(found, charts, late)
+    ways = [found, *other_ways(found, charts, late)]
+    best = held(min(ways, key=lambda way: place_of(way, charts)))
+    best.config = replace(best.config, stretch=config.stretch)
+    return best
+
+
+def opened_and_closed(search: Search, charts: int, late: Late) -> Search:
+    """The search, changed in place, with slits until the stretch is within bounds, and closed as far as that allows."""
+    config, bounds = search.config, Bounds(charts, search.config.stretch)
+    opened_up(search, bounds.excess, config, late)
+    Closing(search, bounds, config.closing, late).close(config.slit.price, config.closing.tries)
+    found = search if late() else with_straight_seams(search)
+    return spent(found, bounds, config, config.closing.tries_dearer, late)
+
+
+def other_ways(search: Search, charts: int, late: Late) -> list[Search]:
+    """Seams grown, and where bounds are not kept, the search gone on with as scaffolds hold charts apart."""
+    if late():
+        return []
+    ways = grown_ways(search, charts, late)
+    kept = [way for way in [search, *ways] if place_of(way, charts)[:2] == (False, False)]
+    return ways if kept else [*ways, opened_and_closed(held(search), charts, late)]
+
+
+def held(search: Search) -> Search:
+    """The search with scaffolds that hold its charts apart."""
+    config = search.config
+    scaffold = replace(config.slit.contact.scaffold, rounds=config.closing.growing.rounds)
+    found = search.twin()
+    found.config = replace(config, slit=replace(config.slit, contact=replace(config.slit.contact, scaffold=scaffold)))
+    return found
+
+
+def grown_ways(search: Search, charts: int, late: Late = never) -> list[Search]:
+    """Searches of one chart from seams grown, slit and closed; those that are stretched too much are left out."""
+    bare, growing, stretch = held(search), search.config.closing.growing, search.config.stretch
+    cuts = grown(search.surface, tuple(share * stretch for share in growing.energies), bare.config)
+    begun = [way for way in parallel_map(lambda cut: as_one_chart(bare, cut), cuts) if way is not None]
+    ways = [way for way in begun if way.energy() <= growing.hopeful * stretch]
+    found = parallel_map(lambda way: slit_and_closed(way, charts, late), ways)
+    return [way for way in found if way.energy() <= stretch]
+
+
+def slit_and_closed(search: Search, charts: int, late: Late) -> Search:
+    """The search of one chart with slits until the stretch is within bounds, and seams closed as far as that allows."""
+    config = search.config
+    opened_by_need(search, config.stretch, late)
+    bounds = Bounds(charts, config.stretch)
+    return spent(with_straight_seams(search), bounds, config, config.closing.growing.tries_closing, late)
+
+
+def opened_by_need(search: Search, excess: float, late: Late) -> None:
+    """Slits, to where curvature asks for them, until the stretch is within bounds: in place, the worst piece first."""
+    for key in sorted(search.pieces, key=lambda key: -search.pieces[key].energy):
+        piece, over = search.pieces[key], search.energy() - excess
+        if over <= 0.0 or late():
+            return
+        search.pieces[key] = opened_to(piece, search.area, piece.energy - over, search.config, late)
 
 
 def spent(search: Search, bounds: Bounds, config: FinishConfig, tries: int, late: Late = never) -> Search:
@@ -109,6 +173,7 @@ def spent(search: Search, bounds: Bounds, config: FinishConfig, tries: int, late
 
 def spent_fine(search: Search, charts: int, config: FinishConfig, late: Late = never) -> Search:
     """As `spent`, on the surface itself, in few tries; slits come first where the stretch is too much."""
+    opened_by_need(search, config.stretch, late)
     opened_up(search, config.stretch, config, late)
     return spent(search, Bounds(charts, config.stretch), config, config.closing.tries_fine, late)
 
@@ -116,10 +181,9 @@ def spent_fine(search: Search, charts: int, config: FinishConfig, late: Late = n
 def settled(searches: list[Search], charts: int, config: FinishConfig, late: Late = never) -> Search:
     """The best search on the surface itself with slits that pay, straight arcs, and its stretch spent if asked for.
 
-    Under a bound on stretch a slit may be a detour, or the room that two seams are closed in: both ways are gone.
+    Under a bound on stretch that is kept a slit is a detour.
     """
-    ways = [(search, True) for search in searches]
-    ways += [(search, False) for search in searches if 0.0 < search.energy() <= config.stretch]
+    ways = [(search, not 0.0 < search.energy() <= config.stretch) for search in searches]
     found = parallel_map(lambda way: settled_way(way[0], charts, config, late, slits=way[1]), ways)
     return min(found, key=lambda search: place_of(search, charts))
 

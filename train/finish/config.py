@@ -31,6 +31,32 @@ class FlapConfig:
 
 
 @dataclass(frozen=True)
+class ScaffoldConfig:
+    """Holding a chart apart by triangles around it."""
+
+    rounds: int = 0
+    """Scaffolds, each made anew, at most; 0 for contacts in their place."""
+    iterations: int = 2
+    """SLIM iterations with each."""
+    share: float = 0.01
+    """What all of a scaffold's triangles count, as a share of the chart's excess energy …"""
+    least: float = 0.02
+    """… or of so much of its area, where that is more."""
+    still: float = 0.01
+    """A round that lowers the energy by less than this share is one of two that end it."""
+    patience: float = 5.0
+    """How many more drops like the last one a round is trusted with."""
+    points: int = 24
+    """Points of the ring around the chart."""
+    away: float = 1.5
+    """Radius of the ring, as a multiple of the chart's."""
+    turns: int = 20
+    """Edges turned to triangulate, as a multiple of the border's vertices, after which that is given up."""
+    gap: float = 0.02
+    """How far the two sides of a fresh cut are moved apart, as a share of the way into their faces."""
+
+
+@dataclass(frozen=True)
 class ContactConfig:
     """Taking overlap inside a chart apart."""
 
@@ -64,6 +90,8 @@ class ContactConfig:
     """Weight of the pins against the distortion energy."""
     most: float = 0.5
     """Share of the boundary that may be buried before the case is given up."""
+    scaffold: ScaffoldConfig = field(default_factory=ScaffoldConfig)
+    """What holds a chart apart where seams are to be as short as a bound on stretch allows."""
 
 
 @dataclass(frozen=True)

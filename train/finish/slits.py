@@ -19,6 +19,7 @@ from .contact import Relaxed, excess_energy, relax
 from .curvature import Curvature, foretold_energies
 from .disks import ShortestPaths, cut_open, edge_costs, path_mask, shortest_paths, trace_back
 from .flatten import jacobians
+from .scaffold import relaxed_within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,6 +44,8 @@ class Flat(NamedTuple):
 
     def relaxed(self, config: ContactConfig, *, goal: float = np.inf) -> Flat:
         """The piece after SLIM, still valid; unchanged where the goal (excess energy) is out of sight."""
+        if config.scaffold.rounds:
+            return self._replace(uv=relaxed_within(self.surface, self.uv, config, goal))
         state = relax(self.surface, Relaxed(self.uv, self.pins), config, goal=goal)
         return self._replace(uv=state.uv, pins=state.pins)
 

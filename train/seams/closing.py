@@ -7,6 +7,7 @@ of those is taken, as long as it stays valid and within a bound on stretch.   Le
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..finish.flatten import sorted_loops
 from ..finish.pieces import Overlapping, Piece, flattened, measured
 from ..finish.slits import Flat, Slit
 from ..workers import parallel_map
+from .held import laid_within, sewn_up
 from .network import chains, intervals, seam_edges
 
 if TYPE_CHECKING:
@@ -114,7 +116,8 @@ class Closing:
     def within_bounds(self, runs: list[Run]) -> list[Run]:
         """Those of the runs that are foretold to leave the stretch within bounds."""
         room = self.bounds.excess - self.search.energy()
-        return [run for run in runs if run.paid < room + self.config.doubt]
+        hope = self.config.hope if self.search.config.slit.contact.scaffold.rounds else 1.0
+        return [run for run in runs if run.paid * hope < room + self.config.doubt]
 
     def flatten(self, runs: list[Run], seam: NDArray[np.bool_]) -> None:
         """Flatten what is left by closing each of these runs, those that are new."""
@@ -152,11 +155,12 @@ class Closing:
 
     def runs(self, seam: NDArray[np.bool_]) -> list[Run]:
         """All runs that may be closed, with what curvature foretells."""
-        found = []
+        found, config = [], self.config
+        shares = config.shares_held if self.search.config.slit.contact.scaffold.rounds else config.shares
         for chain in chains(self.search, seam):
             if not chain.loose and len(chain.sides) < 2:
                 continue
-            for edges in intervals(chain, self.config.shares, self.config.least):
+            for edges in intervals(chain, shares, config.least, both=self.search.config.stretch > 0.0):
                 saved = path_length(self.search, edges)
                 run = Run(edges, chain.sides, saved, 0.0)
                 if run.name not in self.foretold:
@@ -191,7 +195,11 @@ class Closing:
         others = search.energy() - sum(search.pieces[key].energy for key in run.sides)
         still = seam.copy()
         still[run.edges] = False
-        return valid(search, laid_open(search, ids, still, self.bounds.excess - others), self.config.rounds)
+        goal = self.bounds.excess - others
+        if not search.config.slit.contact.scaffold.rounds:
+            return valid(search, laid_open(search, ids, still, goal), self.config.rounds)
+        sewn = partial(sewn_up, search.pieces[min(run.sides)]) if len(run.sides) == 1 else None
+        return valid(search, laid_open(search, ids, still, goal, sewn), self.config.rounds, goal, sewn)
 
 
 def path_length(search: Search, edges: NDArray[np.int64]) -> float:
@@ -213,7 +221,8 @@ def laid_open(
     disk, slits = opened
     if start is None and len(boundary_loops(disk.faces)) == 1:
         first = border_first(disk, sorted_loops(disk)[0], search.config.slit.contact.cotangents)
-        if lies_over_itself(disk, first, search.config.closing.hopeless):
+        held = search.config.slit.contact.scaffold.rounds
+        if not held and lies_over_itself(disk, first, search.config.closing.hopeless):
             return None
         start = lambda _: first  # noqa: E731
     uv = flattened(disk, search.config.slit.contact, goal * search.area, start)
@@ -248,8 +257,16 @@ def lies_over_itself(disk: Surface, uv: NDArray[np.float64], most: float) -> boo
     return float(areas[flap_faces(uv[disk.faces], areas)].sum()) > most * float(areas.sum())
 
 
-def valid(search: Search, found: Piece | Overlapping | None, rounds: int) -> Trimmed | None:
-    """A flattening as it is; where a little overlaps, drawn apart in so many rounds, or less its flaps; else None."""
+def valid(
+    search: Search, found: Piece | Overlapping | None, rounds: int, goal: float = np.inf, start: Start | None = None
+) -> Trimmed | None:
+    """A flattening as it is; where a little overlaps, drawn apart in so many rounds, or less its flaps; else None.
+
+    With scaffolds, one that overlaps is laid out anew within them, from ``start`` if that is valid, where that leads
+    to an excess energy of ``goal``.
+    """
+    if isinstance(found, Overlapping) and search.config.slit.contact.scaffold.rounds:
+        return laid_within(search, found, goal, start)
     less = search.less_flaps(found)
     if not isinstance(found, Overlapping) or less is None:
         return less

@@ -21,7 +21,7 @@ class Chain(NamedTuple):
 
     path: (n + 1,) vertices.  edges: (n,) rows of the table.  reach: (n + 1,) length up to each vertex, in √A.
     sides: keys of the pieces beside it, one where it lies inside a piece.  loose: it ends inside a piece, where it can
-    be closed from.
+    be closed from.  free: it begins inside a piece as well.
     """
 
     path: NDArray[np.int64]
@@ -29,6 +29,7 @@ class Chain(NamedTuple):
     reach: NDArray[np.float64]
     sides: tuple[int, ...]
     loose: bool
+    free: bool = False
 
 
 def seam_edges(state: State) -> NDArray[np.bool_]:
@@ -88,18 +89,19 @@ def as_chain(state: State, label: NDArray[np.int64], path: list[int], way: list[
     points = state.surface.vertices[path]
     reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(points[1:] - points[:-1], axis=1))]) / state.unit
     sides = tuple(np.unique(label[state.table.edge_faces[edges[0]]]).tolist())
-    return Chain(np.array(path, dtype=np.int64), edges, reach, sides, any(ends))
+    return Chain(np.array(path, dtype=np.int64), edges, reach, sides, any(ends), all(ends))
 
 
-def intervals(chain: Chain, shares: tuple[float, ...], least: int) -> list[NDArray[np.int64]]:
+def intervals(chain: Chain, shares: tuple[float, ...], least: int, *, both: bool = False) -> list[NDArray[np.int64]]:
     """Runs of edges that may be closed: at the loose end, or where two pieces meet, at both ends and half way.
 
-    shares: of the chain's length.  least: edges of each run.
+    shares: of the chain's length.  least: edges of each run.  both: at each loose end, where there are two.
     """
     total, count = float(chain.reach[-1]), len(chain.edges)
     found: dict[tuple[int, int], None] = {}
     for share in shares:
         places = [total - share * total] if chain.loose else [0.0, total - share * total, 0.5 * (1.0 - share) * total]
+        places = [0.0, *places] if chain.free and both else places
         for start in places:
             first = int(np.argmin(np.abs(chain.reach - start)))
             last = int(np.argmin(np.abs(chain.reach - start - share * total)))
