@@ -45,7 +45,21 @@ def without_flips(disk: Surface, uv: NDArray[np.float64], steps: int) -> NDArray
 
 
 def sewn_up(piece: Piece, disk: Surface) -> NDArray[np.float64]:
-    """Uv (v, 2) of the same faces with fewer cuts: each vertex half way between the places that it had."""
-    corner, vertex = piece.flat.uv[piece.flat.surface.faces].reshape(-1, 2), disk.faces.reshape(-1)
-    count, size = np.bincount(vertex), len(disk.vertices)
-    return np.stack([np.bincount(vertex, at, minlength=size) for at in corner.T], axis=1) / count[:, None]
+    """Uv (v, 2) of the same faces with fewer cuts: each vertex half way between the places that it had.
+
+    disk: those faces, and fans that fill holes after them; the middle of a fan lies in the middle of its border.
+    """
+    own = len(piece.ids)
+    corner = piece.flat.uv[piece.flat.surface.faces].reshape(-1, 2)
+    uv = mean_at(disk.faces[:own].reshape(-1), corner, len(disk.vertices))
+    if len(disk.faces) > own:
+        border, middle = disk.faces[own:, :1], disk.faces[own:, 2]
+        filled = np.unique(middle)
+        uv[filled] = mean_at(middle, uv[border[:, 0]], len(disk.vertices))[filled]
+    return uv
+
+
+def mean_at(vertex: NDArray[np.int64], places: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """(size, 2) the mean of the places (n, 2) that each vertex (n,) has; 0 for one that has none."""
+    count = np.maximum(np.bincount(vertex, minlength=size), 1)
+    return np.stack([np.bincount(vertex, at, minlength=size) for at in places.T], axis=1) / count[:, None]

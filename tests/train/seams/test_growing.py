@@ -15,7 +15,11 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts.tighten import held, tightened
 from flexpara.train.config import FinishConfig
+from flexpara.train.finish.flatten import fill_holes, sorted_loops
+from flexpara.train.finish.pieces import Piece
+from flexpara.train.finish.slits import Flat
 from flexpara.train.seams.growing import Growing, as_one_chart, grown, opened_to
+from flexpara.train.seams.held import sewn_up
 from flexpara.train.seams.network import chains, intervals, seam_edges
 from flexpara.train.search.labels import dual_graph
 from flexpara.train.search.search import Search
@@ -90,6 +94,18 @@ def test_a_chart_is_opened_until_its_energy_is_what_is_asked_for_and_counts_its_
     search.pieces = {0: opened}
     assert opened.slit_length == pytest.approx(length(surface, seam_edges(search)))
     assert not overlaps_anywhere(opened.flat.uv[opened.flat.surface.faces])
+
+
+def test_a_chart_sewn_up_has_its_vertices_half_way_and_the_middles_of_filled_holes_in_the_middle_of_them() -> None:
+    """A ring of four quads around a hole."""
+    place = np.array([[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2], [1, 2]], dtype=np.float64)
+    ring = np.array([[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]])
+    surface = Surface(np.concatenate([place, np.zeros((8, 1))], axis=1), ring)
+    piece = Piece(np.arange(8), Flat(surface, place, {}), 0.0, 0.0)
+    filled = fill_holes(surface, sorted_loops(surface)[1:])
+    uv = sewn_up(piece, filled)
+    assert np.array_equal(uv[:8], place)
+    assert uv[8] == pytest.approx([1.5, 1.5])
 
 
 def test_a_seam_with_two_ends_inside_its_chart_can_be_closed_from_both() -> None:
