@@ -40,9 +40,10 @@ def stages(models: Path) -> None:
     kept: list[Search] = []
     original = chart_module.best_search
 
-    def watched(*words: Any) -> Search:
-        kept.append(original(*words))
-        return kept[-1]
+    def watched(*words: Any) -> list[Search]:
+        found = original(*words)
+        kept.append(found[0])
+        return found
 
     chart_module.best_search = watched
     try:
