@@ -197,8 +197,8 @@ def test_progress_is_told_in_lines_for_programs(
     answer = exchange.read_answer(tmp_path / "out" / "house.npz", house)
     assert answer.answered.all()
     assert answer.cut == 0
-    flat = answer.uv[:, 0] - answer.uv[0, 0]
-    np.testing.assert_allclose(flat / flat[1], house.positions[house.loop_vertex, 0], atol=1e-5)
+    flat = (answer.uv - answer.uv[0]) @ (1.0, 1.0j)  # turned and scaled it is the house
+    np.testing.assert_allclose(flat / flat[1], house.positions[house.loop_vertex, :2] @ (1.0, 1.0j), atol=1e-5)
 
 
 def test_evaluate_writes_what_is_true_of_each_triangle(tmp_path: Path, house: Any) -> None:
