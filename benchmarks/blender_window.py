@@ -18,6 +18,8 @@ bpy: Any = importlib.import_module("bpy")  # the checkers of types have none
 EXTENSION = Path(__file__).resolve().parents[1] / "integrations" / "blender"
 TAB_BELOW = 173
 """Pixels from the top of a sidebar to the middle of its fourth tab."""
+ROOM = 1.4
+"""Times what fills the view that the view shows, so that the sidebar covers none of it."""
 WAIT = 1.0
 """Seconds between two steps, in which Blender draws."""
 
@@ -81,6 +83,8 @@ def framed() -> None:
             region = next(region for region in area.regions if region.type == "WINDOW")
             with bpy.context.temp_override(area=area, region=region):
                 ways[area.type]()
+        if area.type == "VIEW_3D":
+            area.spaces.active.region_3d.view_distance *= ROOM
 
 
 def tab_chosen(kind: str, value: str) -> None:
