@@ -6,6 +6,7 @@ mirrored; "Arm" has a skin and a morph target.
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import struct
@@ -39,6 +40,17 @@ class Scene:
 
     def points(self, array: np.ndarray) -> int:
         return self.add(array, min=array.min(axis=0).tolist(), max=array.max(axis=0).tolist())
+
+    def scene(self, *primitives: dict[str, Any], nodes: list[dict[str, Any]] | None = None) -> None:
+        """One mesh per primitive and, unless told, one node per mesh."""
+        self.tree["meshes"] = [{"primitives": [primitive]} for primitive in primitives]
+        self.tree["nodes"] = nodes or [{"mesh": index} for index in range(len(primitives))]
+        self.tree["scenes"] = [{"nodes": list(range(len(self.tree["nodes"])))}]
+
+    def gltf(self, uri: str | None = None) -> bytes:
+        inline = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+        buffers = [{"byteLength": len(self.data), "uri": uri or inline}]
+        return json.dumps({**self.tree, "buffers": buffers}).encode()
 
     def glb(self) -> bytes:
         data = self.data + b"\0" * (-len(self.data) % 4)

@@ -2,39 +2,26 @@
 
 from __future__ import annotations
 
-import base64
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from scenefile import Scene
 
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.gltf.scene import read_gltf
 
 
-class Maker:
+class Maker(Scene):
     """A file of one triangle, with room for more accessors of floats."""
 
     def __init__(self) -> None:
-        self.data = b""
-        self.tree: dict[str, Any] = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": []}
-        self.tree["meshes"] = [{"primitives": [{"attributes": {"POSITION": self.add(np.eye(3, k=-1))}}]}]
+        super().__init__()
+        self.tree["meshes"] = [{"primitives": [{"attributes": {"POSITION": self.floats(np.eye(3, k=-1))}}]}]
         self.tree["nodes"] = [{"mesh": 0}]
 
-    def add(self, rows: np.ndarray) -> int:
-        data = rows.astype(np.float32).tobytes()
-        self.tree["bufferViews"].append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
-        view = len(self.tree["bufferViews"]) - 1
-        kind = {"componentType": 5126, "count": len(rows), "type": f"VEC{rows.shape[1]}"}
-        self.tree["accessors"].append({"bufferView": view, **kind})
-        self.data += data
-        return view
-
-    def gltf(self) -> bytes:
-        uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
-        return json.dumps({**self.tree, "buffers": [{"byteLength": len(self.data), "uri": uri}]}).encode()
+    def floats(self, rows: np.ndarray) -> int:
+        return self.add(rows.astype(np.float32))
 
 
 def test_what_a_still_mesh_cannot_say_is_counted(tmp_path: Path) -> None:
@@ -60,9 +47,9 @@ def test_instances_stand_where_they_are_put(tmp_path: Path) -> None:
     maker = Maker()
     half = np.sqrt(0.5)
     names = {
-        "TRANSLATION": maker.add(np.array([[5, 0, 0], [0, 0, 7]])),
-        "ROTATION": maker.add(np.array([[0, 0, 0, 1], [0, 0, half, half]])),
-        "SCALE": maker.add(np.array([[2, 2, 2], [1, 1, 1]])),
+        "TRANSLATION": maker.floats(np.array([[5, 0, 0], [0, 0, 7]])),
+        "ROTATION": maker.floats(np.array([[0, 0, 0, 1], [0, 0, half, half]])),
+        "SCALE": maker.floats(np.array([[2, 2, 2], [1, 1, 1]])),
     }
     node = maker.tree["nodes"][0]
     node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": names}}
@@ -93,7 +80,7 @@ def test_a_skinned_mesh_stands_where_its_first_joint_takes_it(tmp_path: Path) ->
     maker = Maker()
     bind = np.eye(4)
     bind[:3, 3] = (0, 0, -4)
-    matrices = maker.add(np.concatenate([bind.T, np.eye(4)]))
+    matrices = maker.floats(np.concatenate([bind.T, np.eye(4)]))
     maker.tree["accessors"][matrices] |= {"type": "MAT4", "count": 2}
     maker.tree["skins"] = [{"joints": [1, 2], "inverseBindMatrices": matrices}]
     maker.tree["nodes"] = [{"mesh": 0, "skin": 0, "translation": [9, 9, 9]}, {"translation": [0, 0, 5]}, {}]

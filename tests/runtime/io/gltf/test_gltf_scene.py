@@ -2,67 +2,24 @@
 
 from __future__ import annotations
 
-import base64
 import io
-import json
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from scenefile import Scene
 
 from flexpara.runtime.errors import MeshError
 from flexpara.runtime.io.gltf.scene import read_gltf
 from flexpara.runtime.samples import make_sample
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=np.float32)
-KINDS = {np.dtype(np.int8): 5120, np.dtype(np.uint8): 5121, np.dtype(np.uint16): 5123, np.dtype(np.float32): 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
-class Maker:
-    """Collects arrays into one buffer and knows their accessors."""
-
-    def __init__(self) -> None:
-        self.data = b""
-        self.tree: dict[str, Any] = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": []}
-
-    def view(self, data: bytes) -> int:
-        self.data += b"\0" * (-len(self.data) % 4)
-        self.tree["bufferViews"].append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
-        self.data += data
-        return len(self.tree["bufferViews"]) - 1
-
-    def add(self, array: np.ndarray, **more: object) -> int:
-        rows = array.reshape(len(array), -1)
-        kind = {"componentType": KINDS[rows.dtype], "count": len(rows), "type": TYPES[rows.shape[1]]}
-        self.tree["accessors"].append({"bufferView": self.view(rows.tobytes()), **kind, **more})
-        return len(self.tree["accessors"]) - 1
-
-    def scene(self, *primitives: dict[str, Any], nodes: list[dict[str, Any]] | None = None) -> None:
-        """One mesh per primitive and, unless told, one node per mesh."""
-        self.tree["meshes"] = [{"primitives": [primitive]} for primitive in primitives]
-        self.tree["nodes"] = nodes or [{"mesh": index} for index in range(len(primitives))]
-        self.tree["scenes"] = [{"nodes": list(range(len(self.tree["nodes"])))}]
-
-    def glb(self) -> bytes:
-        text = json.dumps({**self.tree, "buffers": [{"byteLength": len(self.data)}]}).encode()
-        text += b" " * (-len(text) % 4)
-        data = self.data + b"\0" * (-len(self.data) % 4)
-        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-    def gltf(self, uri: str | None = None) -> bytes:
-        inline = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
-        buffers = [{"byteLength": len(self.data), "uri": uri or inline}]
-        return json.dumps({**self.tree, "buffers": buffers}).encode()
-
-
-def triangle(**attributes: np.ndarray) -> Maker:
-    maker = Maker()
+def triangle(**attributes: np.ndarray) -> Scene:
+    maker = Scene()
     places = {"POSITION": maker.add(TRIANGLE)}
     places.update({name: maker.add(array) for name, array in attributes.items()})
     maker.scene({"attributes": places})
@@ -84,7 +41,7 @@ def test_uv_turn_v_up_without_any_material(tmp_path: Path) -> None:
 
 
 def test_normalized_integers_become_fractions(tmp_path: Path) -> None:
-    maker = Maker()
+    maker = Scene()
     uv = maker.add(np.array([[0, 0], [65535, 0], [0, 13107]], dtype=np.uint16), normalized=True)
     colors = maker.add(np.array([[255, 0, 0, 255], [0, 55, 0, 128], [0, 0, 0, 0]], dtype=np.uint8), normalized=True)
     normals = maker.add(np.array([[0, 0, 127, 0]] * 3, dtype=np.int8)[:, :3].copy(), normalized=True)
@@ -99,7 +56,7 @@ def test_normalized_integers_become_fractions(tmp_path: Path) -> None:
 
 
 def test_interleaved_and_sparse_accessors_are_read(tmp_path: Path) -> None:
-    maker = Maker()
+    maker = Scene()
     rows = np.zeros(3, dtype=[("xyz", "<f4", (3,)), ("uv", "<f4", (2,))])
     rows["xyz"], rows["uv"] = TRIANGLE, [[0, 0], [1, 0], [0, 1]]
     view = maker.view(rows.tobytes()[:-8] + rows.tobytes()[-8:])
@@ -124,7 +81,7 @@ def test_interleaved_and_sparse_accessors_are_read(tmp_path: Path) -> None:
     ("mode", "faces"), [(4, [[0, 1, 2]]), (5, [[0, 1, 2], [1, 3, 2]]), (6, [[1, 2, 0], [2, 3, 0]])]
 )
 def test_strips_and_fans_become_triangles_of_one_winding(tmp_path: Path, mode: int, faces: list[list[int]]) -> None:
-    maker = Maker()
+    maker = Scene()
     positions = maker.add(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype=np.float32))
     indices = maker.add(np.array([0, 1, 2, 3][: 3 if mode == 4 else 4], dtype=np.uint8))
     maker.scene({"attributes": {"POSITION": positions}, "indices": indices, "mode": mode})
@@ -132,7 +89,7 @@ def test_strips_and_fans_become_triangles_of_one_winding(tmp_path: Path, mode: i
 
 
 def test_nodes_are_placed_depth_first_in_scene_order(tmp_path: Path) -> None:
-    maker = Maker()
+    maker = Scene()
     places = {"POSITION": maker.add(TRIANGLE)}
     turn = [0.0, 0.0, np.sin(np.pi / 4), np.cos(np.pi / 4)]
     maker.scene(
@@ -162,7 +119,7 @@ def test_a_mirroring_node_keeps_the_normals_outside(tmp_path: Path) -> None:
     np.testing.assert_allclose(raw.normals, normals)
 
 
-def textured(picture: np.ndarray) -> Maker:
+def textured(picture: np.ndarray) -> Scene:
     stream = io.BytesIO()
     Image.fromarray(picture).save(stream, format="PNG")
     maker = triangle(TEXCOORD_0=TRIANGLE[:, :2].copy(), TEXCOORD_1=TRIANGLE[:, 1:].copy())
