@@ -201,7 +201,9 @@ def main(argv: list[str] | None = None) -> int:
     rows = all_rows(arguments, known)
     own = json.loads(arguments.file_bars.read_text(encoding="utf-8"))
     missed = tables.violations(rows, arguments.bars.split(), own)
-    closing = [*tables.summary(rows), "", f"Missed by {len(missed)} files:" if missed else "Every bar is met."]
+    answered = sum(row["tool"] == "flexpara" and row["code"] == 0 for row in rows)
+    met = f"Every bar is met by the {answered} files that were answered."
+    closing = [*tables.summary(rows), "", f"Missed by {len(missed)} files:" if missed else met]
     closing += [f"- {text}" for text in missed]
     if arguments.compare:
         closing += ["", *tables.compare(tables.read_rows(arguments.compare), rows)]
