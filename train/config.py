@@ -36,7 +36,7 @@ class PlanarConfig:
     aspect: float = 8.0
     """Long side over short side of a development that may be made of more compact ones."""
     span: float = 1.6
-    """The same is allowed up to this length, as a multiple of √(surface area): such a strip fits on the page."""
+    """The same is allowed up to this length, as a multiple of √(area of all parts): such a strip fits on the page."""
     whole_end: float = 0.9
     """Two strips are joined end to end where they meet at so large a share of the wider one's end."""
     long_side: float = 0.4

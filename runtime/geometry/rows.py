@@ -47,6 +47,12 @@ def keys(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], int] | None:
     return key, math.prod(bounds)
 
 
+def grouped(label: NDArray[np.int64], count: int = 0) -> list[NDArray[np.int64]]:
+    """Rows of each label 0, 1, …, ascending; of ``count`` labels at least.  label: (n,)."""
+    order, ends = stable_order(label, int(label.max(initial=0)) + 1), np.cumsum(np.bincount(label, minlength=count))
+    return [order[begin:end] for begin, end in zip([0, *ends.tolist()], ends.tolist(), strict=False)]
+
+
 def first_of_each(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k,) int64 index of the first element with each label 0 … k − 1."""
     first = first_places(label)

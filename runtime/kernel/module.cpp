@@ -10,6 +10,7 @@
 #include "paths.hpp"
 #include "polish.hpp"
 #include "rigid.hpp"
+#include "skyline.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
 
@@ -307,12 +308,39 @@ static void define_clouds(py::module_& module) {
     });
 }
 
+static void define_packing(py::module_& module) {
+    // low, high: of all profiles one after the other; width, top, room: by profile; begin: the first of each chart.
+    module.def("drop", [](const Numbers& low, const Numbers& high, const Indices& width, const Numbers& top,
+                          const Numbers& room, const Indices& begin, const Indices& order, Index columns,
+                          double tightness, double most) -> py::object {
+        const std::size_t charts = order.size();
+        demand(begin.size() == order.size() + 1 && low.size() == high.size() && top.size() == width.size() &&
+               room.size() == width.size(), "profiles of other charts");
+        checked(begin, width.size() + 1);
+        checked(order, charts);
+        std::vector<Profile> profiles;
+        Index at = 0;
+        for (py::ssize_t i = 0; i < width.size(); at += width.data()[i++]) {
+            demand(width.data()[i] > 0 && at + width.data()[i] <= low.size(), "profiles of other widths");
+            profiles.push_back({low.data() + at, high.data() + at, width.data()[i], top.data()[i], room.data()[i]});
+        }
+        Drop found;
+        {
+            py::gil_scoped_release free;
+            found = drop(profiles, begin.data(), order.data(), charts, columns, tightness, most);
+        }
+        if (found.skyline.empty()) return py::none();
+        return py::make_tuple(array_of(found.angle), array_of(found.origin, 2), array_of(found.skyline));
+    });
+}
+
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 8;
+    module.attr("edition") = 10;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);
     define_topology(module);
     define_clouds(module);
+    define_packing(module);
 }

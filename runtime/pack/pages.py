@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..geometry.rows import grouped
 from ..geometry.triangles import signed_areas
 from .asked import faces_of, pack_asked, some_charts
 from .config import PackConfig
@@ -59,7 +60,7 @@ def pack_pages(
     """
     config = square.config(config)
     page = chart_pages(charts, count)[charts.face_chart]
-    used = [np.flatnonzero(page == number) for number in range(count)]
+    used = grouped(page, count)
     found = [_packed(asset, charts, faces, square, seed, config) for faces in used if len(faces)]
     scale = min(packed.report["chart_scale"] for packed in found)
     corner_uv, invalid = np.zeros((len(page), 3, 2), np.float32), []

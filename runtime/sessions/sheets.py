@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..geometry.rows import grouped
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -24,11 +26,10 @@ NEIGHBOURS = 16
 def uv_on_sheet(atlas: Atlas, points: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
     """(n, 2) the uv that each point (n, 3) has on the chart (n,) named for it; NaN where none of its faces is there."""
     found = np.full((len(points), 2), np.nan)
-    near = TOUCH * float(np.ptp(atlas.positions, axis=0).max())
-    for number in np.unique(chart):
-        faces = np.flatnonzero(atlas.face_chart == number)
-        rows = np.flatnonzero(chart == number)
-        if len(faces) == 0:
+    near, corner_uv = TOUCH * float(np.ptp(atlas.positions, axis=0).max()), atlas.corner_uv
+    asked = grouped(chart)
+    for faces, rows in zip(grouped(atlas.face_chart, len(asked)), asked, strict=False):
+        if len(faces) == 0 or len(rows) == 0:
             continue
         corner = atlas.positions[atlas.faces[faces]]
         count = min(NEIGHBOURS, len(faces))
@@ -37,7 +38,7 @@ def uv_on_sheet(atlas: Atlas, points: NDArray[np.float64], chart: NDArray[np.int
         inside = (weight.min(axis=2) >= -TOUCH) & (distance <= near)
         best = inside.argmax(axis=1)
         at = np.arange(len(rows))
-        uv = np.einsum("nc,ncx->nx", weight[at, best], atlas.corner_uv[faces[index[at, best]]])
+        uv = np.einsum("nc,ncx->nx", weight[at, best], corner_uv[faces[index[at, best]]])
         found[rows] = np.where(inside.any(axis=1)[:, None], uv, np.nan)
     return found
 

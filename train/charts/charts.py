@@ -203,7 +203,7 @@ def solve_part(surface: Surface, starts: Starts, page: Page, config: FinishConfi
     haste = starts.haste
     if starts.is_hopeless:
         return UNSOLVED
-    exact = unfolded_part(surface.shape, page.most, starts.handles, config)
+    exact = unfolded_part(surface.shape, page, starts.handles, config)
     if exact is not None and exact.way == "unfolded":
         return exact
     if not (starts.many and haste.is_strict):
@@ -260,21 +260,21 @@ def brought_back(levels: tuple[Surface, Surface, Surface], ways: list[Way], star
     return pieces if middle is surface else refined(surface, middle, pieces, config, late, last)
 
 
-def unfolded_part(surface: Surface, charts: int, handles: int, config: FinishConfig) -> Solved | None:
+def unfolded_part(surface: Surface, page: Page, handles: int, config: FinishConfig) -> Solved | None:
     """A part made of flat facets, unfolded: "unfolded" where that is the answer, "facets" where it is one among others.
 
     None where too little of it is flat; "overlapping" where some of it lies over itself, which is no more than a start.
     A plate with more holes than charts were asked for can't do with those: the
     side of each hole is one.
     """
-    table = edge_table(surface.faces)
+    table, charts = edge_table(surface.faces), page.most
     region = flat_regions(surface, table, config.planar)
     count = int(region.max()) + 1
     faceted = count <= config.planar.facets or count <= config.planar.flat_share * len(surface.faces)
     dear = config.slit.price * least_seam(surface, table, config.planar.bent) > config.planar.dear
     if count > config.planar.most or (dear and not faceted):
         return None
-    found = unfold(surface, table, region, config.planar)
+    found = unfold(surface, table, region, config.planar, page.side)
     if len(found) > config.planar.most_charts + handles:
         return None
     answer = len(found) <= min(config.planar.few, charts) or (faceted and (len(found) <= charts or handles >= charts))

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.triangles import signed_areas
 from .planar import plane_of
 
@@ -65,13 +66,18 @@ class Hinge(NamedTuple):
 
 
 class Unfolding:
-    """Developments of one surface on their way to be joined, and which of its edges are joined already."""
+    """Developments of one surface on their way to be joined, and which of its edges are joined already.
 
-    def __init__(self, surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig) -> None:
+    side: of the page that they share with other surfaces, √(area of all) in this one's units.
+    """
+
+    def __init__(
+        self, surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig, side: float = 0.0
+    ) -> None:
         self.surface, self.table, self.config = surface, table, config
         ends = surface.vertices[table.edges]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        self.unit = float(np.sqrt(surface.face_areas().sum()))
+        self.side = max(side, float(np.sqrt(surface.face_areas().sum())))
         self.tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
         self.owner = region.copy()
         self.members = {number: self._flat(ids) for number, ids in enumerate(grouped(region))}
@@ -154,7 +160,7 @@ class Unfolding:
         """Whether the two joined pack well: no sprawl, no long strip unless joined along long sides."""
         longest = max(self.config.aspect, a.aspect, b.aspect) * (1.0 + 1e-9)
         along = hinge.length >= self.config.long_side * min(a.perimeter, b.perimeter)
-        short = float(whole.box[0]) <= self.config.span * self.unit
+        short = float(whole.box[0]) <= self.config.span * self.side
         least = min(self.config.fill, a.fill * 0.999, b.fill * 0.999)  # slender triangles fill half of theirs
         return whole.fill >= least and (along or short or whole.aspect <= longest)
 
@@ -191,12 +197,15 @@ class Unfolding:
         return self._next - 1
 
 
-def unfold(surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig) -> list[Development]:
+def unfold(
+    surface: Surface, table: EdgeTable, region: NDArray[np.int64], config: PlanarConfig, side: float = 0.0
+) -> list[Development]:
     """Flat regions (f,) joined into developments, the pair that shares most of its border first.
 
     Two join where the shared edges are at least ``config.shared`` of the shorter border, or are the ends of two strips.
+    side: of the page, where other surfaces lie on it too.
     """
-    state = Unfolding(surface, table, region, config)
+    state = Unfolding(surface, table, region, config, side)
     around: dict[int, dict[int, NDArray[np.int64]]] = {number: {} for number in state.members}
     for (a, b), edges in state.shared_edges().items():
         around[a][b] = around[b][a] = edges
@@ -252,12 +261,6 @@ def combined(
     for other, edges in beside.items():
         around[other][number] = edges
     return beside
-
-
-def grouped(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Rows of each label 0, 1, …, ascending."""
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
 
 def rigid_motion(

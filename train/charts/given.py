@@ -11,6 +11,7 @@ import numpy as np
 
 from ...runtime.geometry.metrics import uv_charts
 from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.topology import edge_table, split_non_manifold_vertices
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
@@ -81,8 +82,7 @@ def made_valid(surface: Surface, corner_uv: Corners, config: FinishConfig) -> Se
     faces, old = split_non_manifold_vertices(surface.faces, seam, table)
     opened, uv = Surface(surface.vertices[old], faces), np.zeros((len(old), 2))
     uv[faces.reshape(-1)] = corner_uv.reshape(-1, 2)
-    for number in range(int(island.max()) + 1):
-        ids = np.flatnonzero(island == number)
+    for ids in grouped(island):
         piece, used = opened.part(ids)
         add_island(search, ids, Flat(piece, sized(piece, uv[used]), {}))
     search.place_loose()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.errors import InputError
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Frame, Surface
 from ...runtime.pack.config import IslandConfig
@@ -42,8 +43,7 @@ def kept_islands(asset: Asset, config: FinishConfig) -> Finished:
     ball = Surface(frame.apply(asset.surface.vertices), asset.surface.faces)
     charts = islands.charts
     total, pieces, broken = float(ball.face_areas().sum()), list[Piece](), 0
-    for number in range(len(charts.method)):
-        ids = np.flatnonzero(charts.face_chart == number)
+    for ids in grouped(charts.face_chart):
         flat = Flat.of(ball, ids, _turned(charts.corner_uv[ids] / frame.scale))
         valid = is_valid(flat.surface, flat.uv)
         broken += not valid

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.rows import by_first_appearance, first_of_each
-from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices, stable_order
+from ...runtime.geometry.rows import by_first_appearance, first_of_each, grouped
+from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
 from ...runtime.mesh import Surface
 from ..finish.slits import Flat
 
@@ -53,9 +53,7 @@ def split_parts(surface: Surface, tolerance: float) -> list[Part]:
     table = edge_table(faces)
     opened = Surface(surface.vertices[old], faces, calm=None if surface.calm is None else surface.calm[old])
     component = face_components(len(faces), table.edge_faces[table.manifold])
-    order = stable_order(component, len(faces))
-    size = np.bincount(component)
-    return with_copies([extracted(opened, ids) for ids in np.split(order, np.cumsum(size)[:-1])], tolerance)
+    return with_copies([extracted(opened, ids) for ids in grouped(component)], tolerance)
 
 
 def with_copies(parts: list[Part], tolerance: float) -> list[Part]:

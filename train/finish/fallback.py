@@ -8,6 +8,7 @@ import numpy as np
 import xatlas
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.topology import components, edge_table
 from ...runtime.mesh import Surface
 from .contact import excess_energy
@@ -30,9 +31,7 @@ def unwrapped_by_xatlas(surface: Surface, ids: NDArray[np.int64], total_area: fl
     index = index.astype(np.int64)
     flat = uv.astype(np.float64) * [atlas.width, atlas.height]  # xatlas divides u and v apart
     pieces = []
-    group = components(index, edge_table(index))
-    for number in range(int(group.max()) + 1):
-        rows = np.flatnonzero(group == number)
+    for rows in grouped(components(index, edge_table(index))):
         pieces += _chart(surface, ids[rows], flat[index[rows]], index[rows], total_area)
     return pieces
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.topology import components, edge_table, face_components
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
@@ -37,7 +38,7 @@ def projected(surface: Surface, ids: NDArray[np.int64], total_area: float, confi
     part = Surface(surface.vertices, corners)
     label = smoothed(part, pairs, config)
     group = face_components(len(ids), pairs[label[pairs[:, 0]] == label[pairs[:, 1]]])
-    rows = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
+    rows = grouped(group)
     rows.sort(key=lambda one: -len(one))
     # crumbs by the hundred are one piece of work
     blocks = [rows[at :: config.blocks] for at in range(min(config.blocks, len(rows)))]

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...runtime.errors import ShapeError
 from ...runtime.geometry.overlap import flipped_triangles
+from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.topology import boundary_loops, edge_table, split_non_manifold_vertices
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.mesh import Surface
@@ -115,10 +116,7 @@ def finish_global(
     graph = dual_graph(surface, edge_table(surface.faces), config.finish.labels.seams)
     component = connected_pieces(np.zeros(len(surface.faces), dtype=np.int64), graph)
     stage("flatten")
-    done = [
-        finish_component(surface, np.flatnonzero(component == number), uv, graph, config)
-        for number in range(int(component.max()) + 1)
-    ]
+    done = [finish_component(surface, ids, uv, graph, config) for ids in grouped(component)]
     pieces = sorted((piece for found, _ in done for piece in found), key=lambda piece: int(piece.ids.min()))
     stage("exact check")
     verify(pieces)

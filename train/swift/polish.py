@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...runtime.geometry.distortion import oriented_energy
+from ...runtime.geometry.rows import grouped
 from ...runtime.kernel.choice import kernel
 
 if TYPE_CHECKING:
@@ -34,8 +35,7 @@ def polished(surface: Surface, uv: NDArray[np.float64], sweeps: int, above: floa
     if compiled := kernel():
         return compiled.polished(surface.vertices, surface.faces, uv, sweeps, above)
     uv, faces, area, slopes = uv.copy(), surface.faces, surface.face_areas(), corner_slopes(surface)
-    order = np.argsort(faces.reshape(-1), kind="stable")
-    around = np.split(order, np.cumsum(np.bincount(faces.reshape(-1), minlength=len(uv)))[:-1])
+    around = grouped(faces.reshape(-1), len(uv))
     for _ in range(sweeps):
         jacobian = np.einsum("fci,fcj->fij", uv[faces], slopes)
         upright = np.linalg.det(jacobian) >= UPRIGHT

@@ -15,7 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kernel.choice import kernel
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 
@@ -129,6 +133,8 @@ def drop(
     Returns:
         Where they lie, or None where one is wider than the columns or the height exceeds ``most``.
     """
+    if compiled := kernel():
+        return _drop_compiled(compiled.drop, charts, order, columns, tightness=tightness, most=most)
     skyline = np.zeros(columns)
     angle, origin = np.zeros(len(charts), dtype=np.int64), np.zeros((len(charts), 2))
     for chart in order.tolist():
@@ -154,3 +160,29 @@ def drop(
         if height + shape.top > most:
             return None
     return Drop(angle, origin, skyline)
+
+
+def _drop_compiled(
+    compiled: Callable[..., tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]] | None],
+    charts: list[list[Profile]],
+    order: NDArray[np.int64],
+    columns: int,
+    *,
+    tightness: float,
+    most: float,
+) -> Drop | None:
+    """The same by the kernel."""
+    shapes = [shape for chart in charts for shape in chart]
+    found = compiled(
+        np.concatenate([shape.low for shape in shapes]),
+        np.concatenate([shape.high for shape in shapes]),
+        np.array([len(shape.low) for shape in shapes]),
+        np.array([shape.top for shape in shapes]),
+        np.array([shape.room for shape in shapes]),
+        np.append(0, np.cumsum([len(chart) for chart in charts])),
+        order,
+        columns,
+        tightness / columns,
+        most,
+    )
+    return None if found is None else Drop(*found)

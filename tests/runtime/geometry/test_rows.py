@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexpara.runtime.geometry.rows import by_first_appearance, compacted, distinct, equal_rows, first_of_each, keys
+from flexpara.runtime.geometry.rows import (
+    by_first_appearance,
+    compacted,
+    distinct,
+    equal_rows,
+    first_of_each,
+    grouped,
+    keys,
+)
 
 
 def test_equal_rows_share_a_label_and_no_others_do() -> None:
@@ -58,3 +66,9 @@ def test_compacted_numbers_name_their_places_among_the_different_ones() -> None:
     used, place = compacted(index)
     assert np.array_equal(used, expected)
     assert np.array_equal(place, inverse.reshape(20, 3))
+
+
+def test_rows_are_grouped_by_label() -> None:
+    assert [rows.tolist() for rows in grouped(np.array([1, 0, 1, 3]))] == [[1], [0, 2], [], [3]]
+    assert [rows.tolist() for rows in grouped(np.array([1, 0]), 3)] == [[1], [0], []]
+    assert grouped(np.zeros(0, dtype=np.int64)) == []

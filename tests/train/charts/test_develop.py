@@ -12,7 +12,7 @@ from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pai
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths
 from flexpara.runtime.mesh import Surface
-from flexpara.train.charts.develop import Development, Unfolding, grouped, rigid_motion, unfold
+from flexpara.train.charts.develop import Development, Unfolding, rigid_motion, unfold
 from flexpara.train.charts.planar import flat_regions
 from flexpara.train.config import PlanarConfig
 
@@ -90,10 +90,6 @@ def test_a_square_fills_its_rectangle_and_a_triangle_half_of_it_however_turned()
     assert Development(np.arange(2), square, 4.0).fill == pytest.approx(1.0)
     assert Development(np.arange(2), square @ turn.T + 7.0, 4.0).fill == pytest.approx(1.0)
     assert Development(np.arange(1), square[:1] @ turn.T, 4.0).fill == pytest.approx(0.5)
-
-
-def test_rows_are_grouped_by_label() -> None:
-    assert [group.tolist() for group in grouped(np.array([1, 0, 1, 2]))] == [[1], [0, 2], [3]]
 
 
 def test_the_border_of_a_square_facet_is_four_edges(solid: Callable[[str], Surface]) -> None:

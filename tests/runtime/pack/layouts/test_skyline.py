@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.runtime.pack.layouts.skyline import drop, profile
 
 
@@ -97,3 +98,20 @@ def test_dropped_charts_keep_twice_the_padding(seed: int) -> None:
         assert one[:, 0].max() <= 40.0 - padding + 1e-9
         for other in placed[number + 1 :]:
             assert np.linalg.norm(one[:, None] - other[None], axis=2).min() >= 2.0 * padding - 1e-9
+
+
+@pytest.mark.skipif(kernel() is None, reason="nothing was compiled")
+@pytest.mark.parametrize("seed", range(6))
+def test_the_kernel_drops_charts_where_its_twin_does(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = [profile(rng.uniform(0.0, 9.0, (5, 2, 2)), 0.7) for _ in range(30)]
+    charts = [[shape, shape.turned][: 1 + number % 2] for number, shape in enumerate(shapes)]
+    order, most = rng.permutation(30), (np.inf, 30.0, 200.0)[seed % 3]
+    found = drop(charts, order, 24, tightness=0.8, most=most)
+    with twins_only():
+        expected = drop(charts, order, 24, tightness=0.8, most=most)
+    assert (found is None) == (expected is None) == (most == 30.0)
+    if found is not None and expected is not None:
+        assert found.angle.tolist() == expected.angle.tolist()
+        assert found.origin.tolist() == expected.origin.tolist()
+        assert found.skyline.tolist() == expected.skyline.tolist()
