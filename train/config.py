@@ -249,6 +249,8 @@ class FinishConfig:
     """Charts without a search, where there is no time for one."""
     split: SplitConfig = field(default_factory=SplitConfig)
     """Where a chart may be cut in two."""
+    crumpled: float = 0.25
+    """Mean excess energy of a finished chart above which it is charted anew as a surface of its own."""
     foretold: float = 0.4
     """Energy of a flattening as a share of what curvature foretells, in the median."""
     hopeless: float = 1.5

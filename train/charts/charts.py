@@ -24,6 +24,7 @@ from ..finish.pieces import Piece, measured
 from ..finish.slits import Flat
 from ..swift.swift import better, joined, swift_pieces, swift_rest, swift_sheet
 from ..workers import one_thread_each, parallel_map
+from .anew import uncrumpled
 from .develop import Development, unfold
 from .given import Improved, best_of_copies, given_charts, improvement, no_worse
 from .haste import Haste
@@ -225,6 +226,15 @@ def searched_part(surface: Surface, starts: Starts, page: Page, config: FinishCo
     bests = best_search(coarse, charts, starts, config, exact.pieces if whole and exact is not None else [])
     ways = [way_down(best, charts, starts) for best in bests]
     pieces = brought_back((surface, middle, coarse), ways, starts, page)
+    if not (config.stretch or config.page.free):
+        stage = Stages(deadline=starts.haste.deadline)
+        pieces = uncrumpled(
+            surface,
+            pieces,
+            config.crumpled,
+            lambda alone: chart_surface(alone, charts, config, starts.seed, stage).pieces,
+            starts.late,
+        )
     facets = exact.pieces if exact is not None and exact.way == "facets" else []
     if facets and rank(facets, surface, charts, config) <= rank(pieces, surface, charts, config):
         return Solved(facets, "facets")
