@@ -254,7 +254,7 @@ class UnwrapResult(Unwrapping):
         """As `save`, into an open OutputFolder.  note: told what a user should know.  high: of the outputs, if read."""
         from .bake.checks import check_outputs, chosen_maps
         from .bake.highsource import high_source, mesh_maps
-        from .bake.results.output import BakeJob, result_notes, stack_notes, with_cut, write_outputs, write_reports
+        from .bake.results.output import BakeJob, packing_notes, result_notes, with_cut, write_outputs, write_reports
         from .export.assemble import write_networks
         from .runtime.io.asset.changes import lost
         from .runtime.io.points.written import point_files, write_points
@@ -275,7 +275,7 @@ class UnwrapResult(Unwrapping):
         job = BakeJob.of(self.found.atlas, self.asset, outputs, maps)
         report |= write_outputs(output, job, clock, apart=apart) | ({} if high is None else {"high": high.report()})
         if note is not None:
-            for fact in (*stack_notes(report["pack"]), *result_notes(report)):
+            for fact in (*packing_notes(report["pack"]), *result_notes(report)):
                 note(f"{self.asset.stem}: {fact}")
         write_reports(output, job, {**with_cut(report), "seconds": {**report["seconds"], **clock.rounded}})
         return output.commit()

@@ -79,7 +79,7 @@ def assemble(asset: Asset, trained: Trained, clock: Clock, square: Square) -> Un
         "version": __version__,
         "source": {"stem": asset.stem, "sha256": asset.sha256, "faces": len(asset.faces)},
         "changes": asset.changes,
-        "settings": {**trained.settings, **square._asdict()},
+        "settings": {**trained.settings, **square.facts(atlas.padding)},
         "pack": packed.report,
         "methods": list(trained.charts.method),
         "metrics": metrics.to_dict(),

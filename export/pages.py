@@ -67,7 +67,8 @@ def assemble_pages(asset: Asset, trained: Trained, clock: Clock, square: Square,
     seed, fit = trained.settings["seed"], fit_in_force(trained.settings)
     with clock.stage("pack"):
         paged = pack_pages(asset, trained.charts, square, count, seed)
-    even = square._replace(texel_density=paged.report["chart_scale"] * square.page.side)
+    density = paged.report["chart_scale"] * square.page.side
+    even = square._replace(texel_density=density, padding=paged.report["padding"], spares=False)
     found: list[tuple[Asset, Unwrapped]] = []
     for number in np.unique(paged.page).tolist():
         own = paged.page == number

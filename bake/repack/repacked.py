@@ -20,7 +20,7 @@ from ...runtime.process.progress import Clock
 from ...runtime.saving import Saving
 from ..checks import check_outputs, chosen_maps
 from ..highpoly.highmesh import merge_assets
-from ..results.output import BakeJob, stack_notes, texture_notes, with_cut, write_outputs
+from ..results.output import BakeJob, packing_notes, texture_notes, with_cut, write_outputs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -106,7 +106,7 @@ class PackResult(Saving[PackOutputs]):
         report = {**told_of.report, "outputs": whole.outputs.facts()}
         report |= write_outputs(output, whole, clock, apart=apart, pieces=pieces)
         cut = told({"polygons_cut": report["polygons_cut"]})
-        for fact in (*cut, *stack_notes(self.report["pack"]), *texture_notes(report["textures"])):
+        for fact in (*cut, *packing_notes(self.report["pack"]), *texture_notes(report["textures"])):
             say(f"{self.asset.stem}: {fact}")
         output.write_report({**with_cut(report), "seconds": clock.rounded})
         return output.commit()
@@ -170,7 +170,7 @@ def pack_assets(
         "version": __version__,
         "sources": [{"stem": one.stem, "sha256": one.sha256, "faces": len(one.faces)} for one in assets],
         "changes": summed(changes),
-        "settings": {**asdict(options), "padding": options.margin},
+        "settings": {**asdict(options), "padding": packed.atlas.padding},
         "pack": packed.report,
         "metrics": {**metrics.to_dict(), **({} if page is None else _of_pages(packed.atlas, int(page.max()) + 1))},
     }

@@ -227,10 +227,12 @@ def result_notes(report: Mapping[str, Any]) -> list[str]:
     return [*cut, *written_notes(report["written"]), *texture_notes(report["textures"])]
 
 
-def stack_notes(packing: Mapping[str, Any]) -> list[str]:
-    """A line where charts were laid on others."""
-    count = packing.get("stacked", 0)
-    return [f"{count} charts lie on others and share their texels"] if count else []
+def packing_notes(packing: Mapping[str, Any]) -> list[str]:
+    """A line where charts were laid on others, and one where they are so many that their padding is less than usual."""
+    count, padding, usual = (packing.get(name, 0) for name in ("stacked", "padding", "usual_padding"))
+    stacked = [f"{count} charts lie on others and share their texels"] if count else []
+    less = f"so many charts share the page that their padding is {padding} texels, not {usual}"
+    return [*stacked, f"{less}; pass --padding, or a larger --size"] if usual else stacked
 
 
 def texture_notes(facts: Mapping[str, Any]) -> list[str]:

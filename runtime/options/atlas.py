@@ -47,7 +47,7 @@ class AtlasOptions(SourceOptions):
     """Texels of the atlas and its textures: the side of a square, 16 to 16384, or WIDTHxHEIGHT, as 2048x1024."""
     padding: int | None = None
     """Texels that are kept free around each chart; by default what the target asks for, else the
-    longer side / 256, at least 2."""
+    longer side / 256, at least 2, or less where more than a thousand charts share the page."""
     texel_density: float | None = None
     """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
     rotation: Literal["off", "90", "any"] = "any"
@@ -70,7 +70,7 @@ class AtlasOptions(SourceOptions):
 
     @property
     def margin(self) -> int:
-        """The padding in force, in texels."""
+        """The padding in texels, where charts are not so many that it spares them some."""
         return max(2, self.page.side // 256) if self.padding is None else self.padding
 
     @property

@@ -31,11 +31,16 @@ ALIKE = 1e-9
 def pack_square(
     asset: Asset, charts: Charts, square: Square, seed: int = 0, config: PackConfig | None = None
 ) -> Packed:
-    """As ``packing.pack``, at the density asked for.
+    """As ``packing.pack``, at the density asked for, with the padding that so many charts get.
 
     Raises: as `pack`; InputError where the atlas is too small for that density.
     """
-    config = config or PackConfig()
+    own = square.of(len(charts.method))
+    found = _at_density(asset, charts, own, seed, config or PackConfig())
+    return replace(found, report={**found.report, **square.spared(own)})
+
+
+def _at_density(asset: Asset, charts: Charts, square: Square, seed: int, config: PackConfig) -> Packed:
     loose = config if square.texel_density is None else replace(config, whole_texels=False)
     packed = pack(asset, charts, size=square.page, padding=square.padding, seed=seed, config=loose)
     if square.texel_density is None:
@@ -94,6 +99,6 @@ def _shrunk(asset: Asset, charts: Charts, square: Square, found: Packed, factor:
     fitted = Fitted(placement, placed, found.report["skipped_growth_steps"], snapped, faces, 0.0)
     atlas = as_atlas(asset, charts, fitted, page, square.padding)
     report = {**found.report, "settings": asdict(config), "invalid_charts": snapped.invalid.tolist()}
-    report["chart_scale"] = found.report["chart_scale"] * factor
+    report |= {"padding": square.padding, "chart_scale": found.report["chart_scale"] * factor}
     report |= {"moved_vertices": snapped.moved, "moved_farthest": snapped.farthest / STEPS}
     return Packed(atlas, snapped.invalid, report)

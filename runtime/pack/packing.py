@@ -102,6 +102,7 @@ def pack(
     snapped = fitted.snapped
     atlas = as_atlas(asset, charts, fitted, page, padding)
     report |= {
+        "padding": padding,
         "chart_scale": scale,
         "skipped_growth_steps": fitted.skipped,
     }

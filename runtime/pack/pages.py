@@ -58,7 +58,7 @@ def pack_pages(
 
     Raises: as `pack_asked`.
     """
-    config = square.config(config)
+    asked, config, square = square, square.config(config), square.of(len(charts.method), count)
     page = chart_pages(charts, count)[charts.face_chart]
     used = grouped(page, count)
     found = [_packed(asset, charts, faces, square, seed, config) for faces in used if len(faces)]
@@ -72,7 +72,8 @@ def pack_pages(
         corner_uv[faces] = packed.atlas.uv[packed.atlas.faces]
         invalid.append(np.unique(charts.face_chart[faces])[packed.invalid])
     every = np.sort(np.concatenate(invalid))
-    report = {**found[0].report, "chart_scale": scale, "invalid_charts": every.tolist()}
+    report = {**found[0].report, "padding": square.padding, **asked.spared(square)}
+    report |= {"chart_scale": scale, "invalid_charts": every.tolist()}
     report["pages"] = [len(np.unique(charts.face_chart[own])) for own in used]
     return Paged(page, corner_uv, every, report)
 

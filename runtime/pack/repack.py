@@ -48,7 +48,7 @@ def repack_pages(
     corner_uv[islands.faces], page[islands.faces] = on_tiles(paged), paged.page
     chart = np.full(len(asset.faces), len(islands.charts.method))
     chart[islands.faces] = islands.charts.face_chart
-    like = replace(atlas_from_uv(asset), size=square.size, padding=square.padding)
+    like = replace(atlas_from_uv(asset), size=square.size, padding=paged.report["padding"])
     return Repacked(Packed(atlas_of_corners(asset, chart, corner_uv, like), paged.invalid, report), page)
 
 

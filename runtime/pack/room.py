@@ -26,8 +26,21 @@ if TYPE_CHECKING:
 ROOM = 3.0
 """What is proposed gives a chart, on the mean, a square of so many paddings: two are kept free, one is its own."""
 
+SPARED = 8.0
+"""The side of the square that a chart has on the mean is so many paddings or more, where none was asked for."""
+
 CHARTS_OF_A_PART = 2.0
 """So many are expected, where a proposal is made of the number of parts."""
+
+
+def spared_padding(charts: int, page: PageSize, padding: int, pages: int = 1) -> int:
+    """The padding where none was asked for: this one, or less where so many charts lie on the page; at least 1."""
+    return max(min(padding, int(mean_side(charts, page, pages) / SPARED)), min(padding, 1))
+
+
+def mean_side(charts: float, page: PageSize, pages: int = 1) -> float:
+    """Side of the square that each of so many charts has, in texels."""
+    return math.sqrt(page.width * page.height * pages / max(charts, 1))
 
 
 def most_charts(page: PageSize, padding: int) -> float:
@@ -51,7 +64,8 @@ def demand_room_for_parts(surface: Surface, options: Options) -> None:
 
     Not for charts that lie on each other, nor for those that come from elsewhere.  Raises: NoRoomError.
     """
-    page, padding, pages = options.page, options.margin, options.pages
+    page, pages, padding = options.page, options.pages, options.margin
+    padding = min(padding, 1) if options.padding is None else padding
     most = pages * most_charts(page, padding)
     plain = options.preset == "fast" and options.stack == "off" and not options.keep_islands
     if plain and len(surface.faces) > most and (parts := part_count(surface.faces)) > most:
@@ -66,7 +80,7 @@ def part_count(faces: NDArray[np.int64]) -> int:
 
 def no_room(charts: int, page: PageSize, padding: int, pages: int = 1, *, more: float = 1.0) -> NoRoomError:
     """The error, with a padding and a size that leave room.  more: how many times as many charts may come."""
-    side = math.sqrt(page.width * page.height * pages / max(charts * more, 1))  # of the square that a chart has
+    side = mean_side(charts * more, page, pages)
     lower = min(int(side / ROOM), padding - 1)
     larger = page.times(2 ** max(math.ceil(math.log2(ROOM * padding / side)), 1))
     remedies = [f"--padding {lower}"] if lower > 0 else []

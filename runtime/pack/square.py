@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..pagesize import PageSize
 from .config import PackConfig
+from .room import spared_padding
 
 if TYPE_CHECKING:
     from ..options.atlas import AtlasOptions
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
 
 
 class Square(NamedTuple):
-    """Size and padding in texels; texels per unit of the source, None as many as fit; the rest as in `PackConfig`."""
+    """Size and padding in texels; texels per unit of the source, None as many as fit; the rest as in `PackConfig`.
+
+    spares: nobody asked for that padding, and it may be less where many charts share the page.
+    """
 
     size: Size
     padding: int
@@ -23,11 +27,25 @@ class Square(NamedTuple):
     rotation: Rotation = "any"
     stack: Stack = "off"
     whole_texels: bool = False
+    spares: bool = False
 
     @property
     def page(self) -> PageSize:
         """Width and height."""
         return PageSize.of(self.size)
+
+    def of(self, charts: int, pages: int = 1) -> Square:
+        """The same with the padding that so many charts get, on so many pages."""
+        padding = spared_padding(charts, self.page, self.padding, pages) if self.spares else self.padding
+        return self._replace(padding=padding, spares=False)
+
+    def spared(self, own: Square) -> dict[str, int]:
+        """What a report says of `of`: the padding that few charts get, where these get less."""
+        return {"usual_padding": self.padding} if own.padding < self.padding else {}
+
+    def facts(self, padding: int) -> dict[str, Any]:
+        """What a report says of it, with the padding in force."""
+        return {**{name: value for name, value in self._asdict().items() if name != "spares"}, "padding": padding}
 
     def config(self, config: PackConfig | None = None) -> PackConfig:
         """The numbers of packing with what is asked for among them."""
@@ -38,4 +56,4 @@ class Square(NamedTuple):
 def square_of(options: AtlasOptions) -> Square:
     """The atlas that options ask for."""
     asked = options.rotation, options.stack, options.whole_texels
-    return Square(options.page.stored, options.margin, options.texel_density, *asked)
+    return Square(options.page.stored, options.margin, options.texel_density, *asked, spares=options.padding is None)

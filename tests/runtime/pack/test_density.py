@@ -57,3 +57,13 @@ def test_without_a_density_charts_fill_the_atlas() -> None:
     asset, charts = squares([1.0])
     packed = pack_square(asset, charts, Square(100, 2))
     assert packed.report["chart_scale"] == pytest.approx(0.96, abs=1e-3)
+
+
+def test_many_charts_get_less_padding_where_none_was_asked_for_and_the_report_says_so() -> None:
+    asset, charts = squares([1.0] * 40)
+    packed = pack_square(asset, charts, Square(128, 4, spares=True))
+    assert (packed.atlas.padding, packed.report["padding"], packed.report["usual_padding"]) == (2, 2, 4)
+    asked = pack_square(asset, charts, Square(128, 4))
+    assert (asked.atlas.padding, asked.report["padding"]) == (4, 4)
+    assert "usual_padding" not in asked.report
+    assert packed.report["chart_scale"] > 1.2 * asked.report["chart_scale"]

@@ -13,7 +13,14 @@ from flexpara.runtime.mesh import Surface
 from flexpara.runtime.options.unwrap import Options
 from flexpara.runtime.pack.config import PlaceConfig
 from flexpara.runtime.pack.layouts.placement import find_layout
-from flexpara.runtime.pack.room import demand_room, demand_room_for_parts, most_charts, no_room, part_count
+from flexpara.runtime.pack.room import (
+    demand_room,
+    demand_room_for_parts,
+    most_charts,
+    no_room,
+    part_count,
+    spared_padding,
+)
 from flexpara.runtime.pagesize import PageSize
 
 
@@ -93,3 +100,18 @@ def test_more_parts_than_a_page_holds_are_refused_before_any_chart_is_looked_for
         demand_room_for_parts(loose(most + 1), options)
     for other in (Options(size=64, padding=8, pages=2), Options(size=64, padding=8, stack="identical")):
         demand_room_for_parts(loose(most + 1), other)
+
+
+def test_a_padding_that_nobody_asked_for_leaves_charts_most_of_their_squares() -> None:
+    page = PageSize(2048, 2048)
+    assert [spared_padding(charts, page, 8) for charts in (1, 1024, 1025, 4096, 12_296, 40_000)] == [8, 8, 7, 4, 2, 1]
+    assert spared_padding(40_000, page, 8, pages=16) == 5
+    assert spared_padding(40_000, page, 0) == 0
+    assert spared_padding(10**7, page, 8) == 1
+
+
+def test_parts_are_not_refused_for_a_padding_that_nobody_asked_for() -> None:
+    many = loose(int(most_charts(PageSize(256, 256), 2)) + 1)
+    demand_room_for_parts(many, Options(size=256))
+    with pytest.raises(NoRoomError):
+        demand_room_for_parts(many, Options(size=256, padding=2))
