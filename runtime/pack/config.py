@@ -98,7 +98,7 @@ class RowConfig:
 
 @dataclass(frozen=True)
 class GrowthConfig:
-    """Linear programs that move placed charts and let them grow until they jam."""
+    """Linear programs that move and turn placed charts and let them grow until they jam."""
 
     few: int = 128
     """Up to so many charts are moved; more only grow where they lie."""
@@ -118,6 +118,10 @@ class GrowthConfig:
     """Segments this much farther apart than the closest ones still count as facing each other, share."""
     sample: float = 1.0 / 256.0
     """Distance of the samples by which facing segments are found, share."""
+    straight: float = 0.75
+    """Share of an outline along the axes from which a chart is not turned …"""
+    askew: float = 0.5
+    """… and degrees by which that part may differ from them."""
     repairs: int = 40
     """How often the exact distances may still find a pair too close in the end."""
 

@@ -1,8 +1,9 @@
 """Packing: charts → Atlas, at an exact size, with padding kept and every chart at the same texel density.
 
 k charts · P padding in texels.  Chart coordinates are source units, v up.  A chart is turned to its smallest bounding
-rectangle, then by quarter turns, and moved; never mirrored, never stretched.  Outlines of two charts stay 2·P apart,
-and P from the border of the page.  Until the lattice, lengths are in sides of the page: its longer side is 1.
+rectangle, then by quarter turns, moved, and turned a little where it grows; never mirrored, never stretched.  Outlines
+of two charts stay 2·P apart, and P from the border of the page.  Until the lattice, lengths are in sides of the page:
+its longer side is 1.
 
 Charts are dropped on a skyline (`skyline`, `placement`), grow where they lie until they jam (`growth`), keep the
 padding exactly (`padding`), and go to a lattice on which the exact tests are made (`lattice`): what was proven is what
@@ -27,7 +28,7 @@ from .config import PackConfig
 from .exact.lattice import STEPS
 from .exact.seamvertices import atlas_normals, split_vertices
 from .growing.growth import grown
-from .growing.outlines import chart_outlines, outline_edges, rotation, upright_angle
+from .growing.outlines import chart_outlines, is_straight, outline_edges, rotation, upright_angle
 from .layouts.nesting import find_nested
 from .layouts.placement import Layout, find_layout
 from .layouts.texels import aligned
@@ -216,7 +217,10 @@ Grown: TypeAlias = "tuple[NDArray[np.float64], int]"
 def _grown(charts: Charts, edges: NDArray[np.bool_], first: _Place, config: PackConfig, slack: float) -> Grown:
     """Charts grown from where they were placed; slack: what is kept free beyond the padding, lattice units."""
     outlines = chart_outlines(charts, edges)
-    return grown(first.placement, outlines, first.page, first.padding, config.growth, slack=slack / STEPS)
+    placed = [flat @ place[:, :2].T for flat, place in zip(outlines, first.placement, strict=True)]
+    turning = np.array([config.rotation == "any" and not is_straight(flat, config.growth) for flat in placed])
+    kept = slack / STEPS
+    return grown(first.placement, outlines, first.page, first.padding, config.growth, slack=kept, turning=turning)
 
 
 def fitted_charts(

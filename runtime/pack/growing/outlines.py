@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...mesh import Charts
+    from ..config import GrowthConfig
 
 
 def outline_edges(faces: NDArray[np.int64], charts: Charts) -> NDArray[np.bool_]:
@@ -58,10 +59,7 @@ def upright_angle(outline: NDArray[np.float64], extent: NDArray[np.float64] | No
     One side of that rectangle lies along an edge of the convex hull (Freeman and Shapira 1975).
     """
     points = outline.reshape(-1, 2)
-    try:
-        points = points[ConvexHull(points).vertices]
-    except QhullError:  # all points on a line: the hull has no edges, the points do
-        points = points[np.lexsort((points[:, 1], points[:, 0]))[[0, -1]]]
+    points = points[hull_corners(points)]
     edge = np.roll(points, -1, axis=0) - points
     angles = -np.arctan2(edge[:, 1], edge[:, 0])
     if extent is not None:
@@ -76,8 +74,24 @@ def upright_angle(outline: NDArray[np.float64], extent: NDArray[np.float64] | No
     return float(angles[np.argmin(needed)])
 
 
+def hull_corners(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(c,) which of the points (n, 2) are corners of their convex hull, counter-clockwise."""
+    try:
+        return ConvexHull(points).vertices.astype(np.int64)
+    except QhullError:  # all points on a line: the hull has no edges, the points do
+        return np.lexsort((points[:, 1], points[:, 0]))[[0, -1]]
+
+
 def is_rectangle(outline: NDArray[np.float64], accuracy: float = 1e-6) -> bool:
     """Whether an upright outline (s, 2, 2) fills its bounding box, to a part of its area."""
     start, end = outline[:, 0], outline[:, 1]
     area = 0.5 * float((start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum())
     return abs(area) >= (1.0 - accuracy) * float(np.prod(np.ptp(outline, axis=(0, 1))))
+
+
+def is_straight(outline: NDArray[np.float64], config: GrowthConfig) -> bool:
+    """Whether most of an outline (s, 2, 2) runs along the axes, so that its borders lie along texels as it stands."""
+    step = outline[:, 1] - outline[:, 0]
+    length = np.linalg.norm(step, axis=1)
+    along = np.abs(step).min(axis=1) <= math.sin(math.radians(config.askew)) * length
+    return float(length[along].sum()) >= config.straight * float(length.sum())

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Crowd:
     """Charts in place: local segments (s, 2, 2) about their centre (k, 2), scaled by one factor; half boxes (k, 2).
 
-    extent: (2,) of the page, and all lengths, in sides of it.
+    Segments of a chart follow each other.  extent: (2,) of the page, and all lengths, in sides of it.
     """
 
     local: NDArray[np.float64]
@@ -37,6 +37,22 @@ class Crowd:
     def segments(self) -> NDArray[np.float64]:
         """(s, 2, 2) where the segments lie."""
         return self.centre[self.chart][:, None] + self.factor * self.local
+
+    def turned(self, angle: NDArray[np.float64]) -> Crowd:
+        """Charts turned by angles (k,) about their centres, which are those of their boxes again."""
+        cosine, sine = np.cos(angle)[self.chart, None], np.sin(angle)[self.chart, None]
+        x, y = self.local[..., 0], self.local[..., 1]
+        local = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+        first = np.searchsorted(self.chart, np.arange(len(self.centre)))
+        low = np.minimum.reduceat(local.min(axis=1), first)
+        high = np.maximum.reduceat(local.max(axis=1), first)
+        middle = (low + high) / 2.0
+        return replace(
+            self,
+            local=local - middle[self.chart][:, None],
+            half=(high - low) / 2.0,
+            centre=self.centre + self.factor * middle,
+        )
 
 
 def padded(crowd: Crowd, border: float, apart: float, config: GrowthConfig) -> Crowd:

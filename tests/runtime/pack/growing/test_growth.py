@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from flexpara.runtime.geometry.gaps import smallest_chart_gap
 from flexpara.runtime.pack.config import GrowthConfig
 from flexpara.runtime.pack.growing.growth import apply_placement, grown
+from flexpara.runtime.pack.growing.outlines import rotation
 from flexpara.runtime.pagesize import PageSize
 
 CONFIG = GrowthConfig()
@@ -60,3 +61,36 @@ def test_turns_are_kept_and_the_scale_stays_common() -> None:
     factor = found[0, 0, 0] / 0.3
     assert factor > 1.0
     assert found[:, :, :2] == pytest.approx(factor * start[:, :, :2])
+
+
+def outline_of(*corners: tuple[float, float]) -> NDArray[np.float64]:
+    start = np.array(corners)
+    return np.stack([start, np.roll(start, -1, axis=0)], axis=1)
+
+
+def test_a_square_that_stands_askew_is_turned_upright_where_it_may_be() -> None:
+    angle = 0.05
+    start = 0.5 * rotation(angle)
+    placement = np.concatenate([start, [[0.3], [0.2]]], axis=1)[None]
+    kept, _ = grown(placement, [SQUARE], PageSize(64, 64), 4, CONFIG)
+    found, _ = grown(placement, [SQUARE], PageSize(64, 64), 4, CONFIG, turning=np.array([True]))
+    assert np.sqrt(np.linalg.det(kept[0, :, :2])) < 0.96 * 56 / 64
+    assert found == pytest.approx(placed((4 / 64, 4 / 64, 56 / 64)), abs=1e-3)
+
+
+def test_charts_that_turn_keep_their_padding_and_one_scale() -> None:
+    wedge = outline_of((0.0, 0.0), (1.0, 0.0), (0.0, 0.7))
+    start = placed((0.08, 0.05, 0.4), (0.52, 0.05, 0.4), (0.08, 0.52, 0.4))
+    start[::2, :, :2] = 0.4 * rotation(0.06)
+    turning = np.array([True, False, True])
+    found, _ = grown(start, [wedge] * 3, PageSize(256, 256), 3, CONFIG, turning=turning)
+    segments = apply_placement(found, np.repeat(np.arange(3), 3), np.concatenate([wedge] * 3))
+    gap = smallest_chart_gap(segments, np.repeat(np.arange(3), 3), spacing=1 / 1024)
+    assert gap is not None
+    assert gap >= 6 / 256
+    assert segments.min() >= 3 / 256
+    assert segments.max() <= 1.0 - 3 / 256
+    scale = np.linalg.det(found[:, :, :2])
+    assert scale == pytest.approx(np.full(3, scale[0]))
+    assert found[1, 0, 1] == 0.0
+    assert scale[0] > np.linalg.det(grown(start, [wedge] * 3, PageSize(256, 256), 3, CONFIG)[0][0, :, :2])

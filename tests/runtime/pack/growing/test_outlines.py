@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from flexpara.runtime.errors import FinishError
 from flexpara.runtime.mesh import Charts
-from flexpara.runtime.pack.growing.outlines import chart_outlines, outline_edges, rotation, upright_angle
+from flexpara.runtime.pack.config import GrowthConfig
+from flexpara.runtime.pack.growing.outlines import (
+    chart_outlines,
+    is_straight,
+    outline_edges,
+    rotation,
+    upright_angle,
+)
 
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 QUAD = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
@@ -58,3 +65,12 @@ def test_a_pole_alone_is_turned_so_that_its_bounding_square_is_small() -> None:
     (pole,) = chart_outlines(charts, outline_edges(FACES, charts))
     turned = pole @ rotation(upright_angle(pole, np.ones(2))).T
     assert np.ptp(turned.reshape(-1, 2), axis=0).max() == pytest.approx(10.1 * np.sqrt(0.5), rel=0.01)
+
+
+def test_an_outline_is_straight_where_most_of_it_runs_along_the_axes() -> None:
+    charts = charts_of(QUAD[FACES], [0, 0])
+    (upright,) = chart_outlines(charts, outline_edges(FACES, charts))
+    assert is_straight(upright, GrowthConfig())
+    assert not is_straight(upright @ rotation(0.1).T, GrowthConfig())
+    (triangle,) = chart_outlines(charts_of(QUAD[FACES[:1]], [0]), np.ones((1, 3), dtype=bool))
+    assert not is_straight(triangle, GrowthConfig())
