@@ -13,6 +13,7 @@
 #include "skyline.hpp"
 #include "slim.hpp"
 #include "topology.hpp"
+#include "unfold.hpp"
 
 namespace py = pybind11;
 using namespace flexpara;
@@ -308,6 +309,30 @@ static void define_clouds(py::module_& module) {
     });
 }
 
+static void define_unfolding(py::module_& module) {
+    // (f,) numbers, (f, 3, 2) uv, and by number the length of the border; None where a coordinate is out of range.
+    // region: (f,) from 0 on.  uv: each region laid flat.  length: of the edges of `edge_table`.  The rest: UnfoldLimits.
+    module.def("unfold", [](const Indices& faces, const Indices& region, const Numbers& uv, const Numbers& length,
+                            const Numbers& limits) -> py::object {
+        checked(faces);
+        checked(region, faces.shape(0));
+        demand(region.size() == faces.shape(0) && uv.size() == 2 * faces.size(), "regions of other faces");
+        demand(limits.size() == 8, "other limits");
+        const double* of = limits.data();
+        Unfolding work(faces.data(), faces.shape(0), region.data(), uv.data(), length.data(), std::size_t(length.size()),
+                       {of[0], of[1], of[2], of[3], of[4], of[5], of[6], of[7]});
+        try {
+            py::gil_scoped_release free;
+            work.run();
+        } catch (const OutOfRange&) {
+            return py::none();
+        }
+        const double* places = work.uv().empty() ? nullptr : work.uv()[0].data();
+        return py::make_tuple(array_of(work.label()), array_of<double>(places, 2 * work.uv().size(), 2),
+                              array_of(work.perimeter()));
+    });
+}
+
 static void define_packing(py::module_& module) {
     // low, high: of all profiles one after the other; width, top, room: by profile; begin: the first of each chart.
     module.def("drop", [](const Numbers& low, const Numbers& high, const Indices& width, const Numbers& top,
@@ -336,11 +361,12 @@ static void define_packing(py::module_& module) {
 
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 10;
+    module.attr("edition") = 11;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);
     define_topology(module);
     define_clouds(module);
     define_packing(module);
+    define_unfolding(module);
 }

@@ -20,10 +20,11 @@ from scipy.spatial import ConvexHull
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.rows import grouped
 from ...runtime.geometry.triangles import signed_areas
-from .planar import plane_of
+from ...runtime.kernel.choice import kernel
+from .planar import laid_flat
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -80,14 +81,16 @@ class Unfolding:
         self.side = max(side, float(np.sqrt(surface.face_areas().sum())))
         self.tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
         self.owner = region.copy()
-        self.members = {number: self._flat(ids) for number, ids in enumerate(grouped(region))}
+        uv = laid_flat(surface, region)
+        self.members = {
+            number: Development(ids, uv[ids], self._border(ids)) for number, ids in enumerate(grouped(region))
+        }
         self._next = len(self.members)
 
-    def _flat(self, ids: NDArray[np.int64]) -> Development:
-        """One flat region in its own plane."""
-        uv = plane_of(self.surface, ids).project(self.surface.triangles[ids].reshape(-1, 3)).reshape(-1, 3, 2)
+    def _border(self, ids: NDArray[np.int64]) -> float:
+        """The length of the border of one flat region."""
         edges, count = np.unique(self.table.face_edges[ids], return_counts=True)
-        return Development(ids, uv, float(self.length[edges[count == 1]].sum()))
+        return float(self.length[edges[count == 1]].sum())
 
     def shared_edges(self) -> dict[tuple[int, int], NDArray[np.int64]]:
         """Manifold edges between two developments, by the pair of them, lower first."""
@@ -205,6 +208,8 @@ def unfold(
     Two join where the shared edges are at least ``config.shared`` of the shorter border, or are the ends of two strips.
     side: of the page, where other surfaces lie on it too.
     """
+    if (compiled := kernel()) and (found := unfold_compiled(compiled.unfold, surface, table, region, config, side)):
+        return found
     state = Unfolding(surface, table, region, config, side)
     around: dict[int, dict[int, NDArray[np.int64]]] = {number: {} for number in state.members}
     for (a, b), edges in state.shared_edges().items():
@@ -230,6 +235,30 @@ def unfold(
             if entry := hoped(state, other, number, around):
                 heappush(queue, entry)
     return sorted(state.members.values(), key=lambda found: int(found.ids[0]))
+
+
+def unfold_compiled(
+    compiled: Callable[..., tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]] | None],
+    surface: Surface,
+    table: EdgeTable,
+    region: NDArray[np.int64],
+    config: PlanarConfig,
+    side: float,
+) -> list[Development] | None:
+    """The same by the kernel; None where its numbers can't hold the uv."""
+    ends = surface.vertices[table.edges]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    span = config.span * max(side, float(np.sqrt(surface.face_areas().sum())))
+    tolerance = config.meeting * float(np.ptp(surface.vertices, axis=0).max())
+    shares = config.whole_end, config.long_side, config.fill, 10.0**config.digits
+    limits = np.array([config.shared, config.aspect, span, *shares, tolerance])
+    found = compiled(surface.faces, region, laid_flat(surface, region), length, limits)
+    if found is None:
+        return None
+    label, uv, perimeter = found
+    uv = uv.reshape(-1, 3, 2)
+    rows = grouped(label)
+    return [Development(ids, uv[ids], around) for ids, around in zip(rows, perimeter.tolist(), strict=True)]
 
 
 def hoped(

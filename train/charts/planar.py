@@ -6,10 +6,11 @@ to it.  A region is then checked as a whole: a finely divided curved surface ben
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.rows import first_of_each
 from ...runtime.geometry.topology import face_components
 from ...runtime.geometry.triangles import corner_angles
 
@@ -22,17 +23,6 @@ if TYPE_CHECKING:
 
 FLOAT32_STEP = 2.0**-24
 """Relative rounding of a coordinate that was stored as float32."""
-
-
-class Plane(NamedTuple):
-    """An orthonormal frame: origin (3,), axes (2, 3); the normal is axes[0] × axes[1]."""
-
-    origin: NDArray[np.float64]
-    axes: NDArray[np.float64]
-
-    def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, 3) points → (n, 2) coordinates in the plane."""
-        return (points - self.origin) @ self.axes.T
 
 
 def flat_regions(surface: Surface, table: EdgeTable, config: PlanarConfig) -> NDArray[np.int64]:
@@ -79,16 +69,23 @@ def deviations(surface: Surface, region: NDArray[np.int64]) -> NDArray[np.float6
     return greatest
 
 
-def plane_of(surface: Surface, ids: NDArray[np.int64]) -> Plane:
-    """The plane of faces ids (m,): their mean normal, and the direction of their longest edge as first axis."""
-    corner = surface.triangles[ids]
-    normal = surface.face_cross()[ids].sum(axis=0)
-    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+def laid_flat(surface: Surface, region: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(f, 3, 2) uv of each region (f,) of numbers 0, 1, … in its own plane.
+
+    The plane lies across the region's mean normal; its first axis runs along the region's longest edge, seen from
+    outside.
+    """
+    corner, count = surface.triangles, int(region.max(initial=-1)) + 1
+    normal = np.stack([np.bincount(region, across, minlength=count) for across in surface.face_cross().T], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     edges = (np.roll(corner, -1, axis=1) - corner).reshape(-1, 3)
-    first = edges[np.linalg.norm(edges, axis=1).argmax()]
-    first = first - (first @ normal) * normal
-    first /= max(float(np.linalg.norm(first)), 1e-300)
-    return Plane(corner[0, 0], np.stack([first, np.cross(normal, first)]))
+    length, owner = np.linalg.norm(edges, axis=1), np.repeat(region, 3)
+    first = edges[np.lexsort((-length, owner))[np.searchsorted(np.sort(owner), np.arange(count))]]
+    first = first - (first * normal).sum(axis=1, keepdims=True) * normal
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    axes = np.stack([first, np.cross(normal, first)], axis=1)
+    origin = corner[first_of_each(region), 0]
+    return np.einsum("fcj,fij->fci", corner - origin[region][:, None], axes[region])
 
 
 def least_seam(surface: Surface, table: EdgeTable, bent: float) -> float:

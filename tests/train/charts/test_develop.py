@@ -11,6 +11,7 @@ import trimesh
 from flexpara.runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.geometry.triangles import edge_lengths
+from flexpara.runtime.kernel.choice import kernel, twins_only
 from flexpara.runtime.mesh import Surface
 from flexpara.train.charts.develop import Development, Unfolding, rigid_motion, unfold
 from flexpara.train.charts.planar import flat_regions
@@ -123,6 +124,30 @@ def test_an_unfolding_is_exact_and_valid_and_holds_each_face_once(name: str, sol
         assert len(overlapping_pairs(development.uv)) == 0
         assert (np.diff(development.ids) > 0).all()
         assert development.fill >= CONFIG.fill
+
+
+@pytest.mark.skipif(kernel() is None, reason="nothing was compiled")
+@pytest.mark.parametrize("name", FACETED)
+def test_the_kernel_unfolds_as_its_twin_does(name: str, solid: Callable[[str], Surface]) -> None:
+    found = developments(solid(name))
+    with twins_only():
+        expected = developments(solid(name))
+    assert [one.ids.tolist() for one in found] == [one.ids.tolist() for one in expected]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one.uv, other.uv, atol=1e-9)
+        assert one.perimeter == pytest.approx(other.perimeter)
+
+
+@pytest.mark.parametrize("side", [0.0, 40.0])
+def test_a_strip_may_be_as_long_as_the_page_that_it_shares(side: float) -> None:
+    """A bent ribbon forty times as long as wide, of squares that meet at their ends."""
+    along = np.cumsum([[0.0, 0.0], *([np.cos(0.1 * n), np.sin(0.1 * n)] for n in range(40))], axis=0)
+    vertices = np.concatenate([np.column_stack([along, np.full(41, z)]) for z in (0.0, 1.0)])
+    faces = np.array([tri for n in range(40) for tri in ([n, n + 1, 42 + n], [n, 42 + n, 41 + n])])
+    ribbon = Surface(vertices, faces)
+    table = edge_table(faces)
+    found = unfold(ribbon, table, flat_regions(ribbon, table, CONFIG), CONFIG, side)
+    assert (len(found) == 1) == (side > 0.0)
 
 
 @pytest.mark.parametrize("name", FACETED)
