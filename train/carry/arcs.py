@@ -9,17 +9,17 @@ e edges of the surface's table · f faces · lengths in √A.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...runtime.geometry.cutgraph import edge_costs, path_mask
+from ...runtime.geometry.cutgraph import path_mask
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.overlap import flipped_triangles
-from ...runtime.geometry.straightpaths import Roads, straightest_path
+from ...runtime.geometry.straightpaths import straightest_path
 from ...runtime.geometry.topology import boundary_loops, edge_table, face_components
 from ...runtime.process.deadline import Late, never
 from ..finish.arap import RigidSteps, evened_out
@@ -27,12 +27,14 @@ from ..finish.contact import Relaxed, boundary_edges, converge, relax, rim_overl
 from ..finish.flatten import jacobians
 from ..finish.pieces import Overlapping, Piece, flattened, measured
 from ..finish.slits import Flat
-from ..seams.closing import opened_along, path_length
+from ..seams.closing import opened_along
 from ..seams.network import chains, seam_edges
 from ..search.labels import dual_graph
 from ..search.search import Search
 from ..workers import parallel_map
+from .exchange import Room, exchanged, turned
 from .fine import bounded
+from .junctions import straighter_junctions
 from .layout import carried_jacobians
 from .moved import as_others_lead
 from .sides import faces_beside
@@ -44,32 +46,21 @@ if TYPE_CHECKING:
     from ..config import FinishConfig
     from ..finish.config import ContactConfig
     from .config import ArcConfig
+    from .exchange import Arc
 
     Laid = Piece | NDArray[np.int64]
     """What became of a piece, or the faces of the surface that make it invalid."""
 
 
-@dataclass(frozen=True, eq=False)
-class Arc:
-    """A part of a chain that may take another way.
-
-    old, new: edges (n,) of the table.  sides: keys of the pieces beside it.  saved: length by which the new way is
-    shorter.
-    """
-
-    old: NDArray[np.int64]
-    new: NDArray[np.int64]
-    sides: tuple[int, ...]
-    saved: float
-
-
 def with_straight_arcs(search: Search, config: ArcConfig, late: Late = never) -> Search:
-    """The search with its seams' arcs straightened, where that does not raise its objective: pass by pass."""
+    """The search with its seams' arcs straightened and junctions moved, where that costs no more: pass by pass."""
     for number, (width, longest) in enumerate(config.passes):
         if late() or len(search.surface.faces) > config.most_faces:
             break
         arcs = straighter_arcs(search, width, longest, config, shifted=number % 2 == 1)
         search = Straightening(search, arcs).run(config.rounds)
+        stars = straighter_junctions(search, width, longest, config, shifted=number % 2 == 1)
+        search = Straightening(search, stars).run(config.rounds)
     return search
 
 
@@ -117,7 +108,11 @@ class Straightening:
     def is_no_worse(self, found: Search, best: Search) -> bool:
         """Whether the objective is no higher than the best one, and the stretch within its bound, if it was."""
         bound = max(found.config.stretch or np.inf, self.search.energy())
-        return found.objective() <= best.objective() and found.energy() <= bound
+        return self.cost(found) <= self.cost(best) and found.energy() <= bound
+
+    def cost(self, found: Search) -> float:
+        """The objective of a search, where turns count as length."""
+        return found.objective() + found.price * found.config.arcs.corner * turned(found, seam_edges(found))
 
     def laid(self) -> tuple[Search | None, NDArray[np.float64]]:
         """The search with the arcs on their new ways; None where a piece is not valid then.
@@ -231,31 +226,20 @@ def straighter_arcs(search: Search, width: float, longest: int, config: ArcConfi
 
     No new way meets another arc, old or new.  longest: edges of an arc.  shifted: chains are parted elsewhere.
     """
-    table, points, seam = search.table, search.surface.vertices, seam_edges(search)
+    seam = seam_edges(search)
     parts = [
         (part, chain.sides) for chain in chains(search, seam) for part in parted(chain.path, longest, shifted=shifted)
     ]
-    barred = np.zeros(len(points), dtype=bool)
-    barred[table.edges[seam | ~table.manifold]] = True
-    free = table.manifold & ~seam
-    cost = edge_costs(search.surface, table, search.config.slit.seams)
-    tree, found = KDTree(points), []
+    room, found = Room(search, seam), []
     for path, sides in sorted(parts, key=lambda part: len(part[0])):
-        old = np.flatnonzero(path_mask(table, [path.tolist()]))
+        old = np.flatnonzero(path_mask(search.table, [path.tolist()]))
         if len(old) < config.least:
             continue
-        reach = width * path_length(search, old) * search.unit / len(old)
-        near = np.zeros(len(points), dtype=bool)
-        near[np.concatenate(tree.query_ball_point(points[path], reach)).astype(np.int64)] = True
-        near[barred] = False
-        near[path] = True
-        inside = np.append(np.flatnonzero(near[table.edges[:, 0]] & near[table.edges[:, 1]] & free), old)
-        roads = Roads(points, table.edges[inside], cost[inside])
-        way = straightest_path(roads, int(path[0]), int(path[-1]), config.turning)
-        new = np.flatnonzero(path_mask(table, [way])) if way else old
+        way = straightest_path(room.around(old, width), int(path[0]), int(path[-1]), config.turning)
+        new = np.flatnonzero(path_mask(search.table, [way])) if way else old
         if not np.array_equal(new, old):
-            barred[way] = True
-            found.append(Arc(old, new, sides, path_length(search, old) - path_length(search, new)))
+            room.barred[way] = True
+            found.append(exchanged(search, seam, old, new, sides))
     return found
 
 
