@@ -43,6 +43,8 @@ class PlanarConfig:
     """Share of the shorter border from which two are joined along a long side: then a strip may come of it."""
     fill: float = 0.51
     """Share of the least rectangle around it that a development must cover: less wastes the texture."""
+    bent_straight: float = 0.02
+    """Mean excess energy up to which a ribbon is bent straight."""
     most: int = 2000
     """Flat regions of a part that unfolding is tried with."""
     digits: int = 6

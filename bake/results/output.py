@@ -228,10 +228,10 @@ def result_notes(report: Mapping[str, Any]) -> list[str]:
 
 
 def packing_notes(packing: Mapping[str, Any]) -> list[str]:
-    """A line where charts were laid on others, and one where they are so many that their padding is less than usual."""
+    """A line where charts were laid on others, and one where their padding is less than usual."""
     count, padding, usual = (packing.get(name, 0) for name in ("stacked", "padding", "usual_padding"))
     stacked = [f"{count} charts lie on others and share their texels"] if count else []
-    less = f"so many charts share the page that their padding is {padding} texels, not {usual}"
+    less = f"charts are so many or so thin that their padding is {padding} texels, not {usual}"
     return [*stacked, f"{less}; pass --padding, or a larger --size"] if usual else stacked
 
 

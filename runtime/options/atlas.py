@@ -47,7 +47,7 @@ class AtlasOptions(SourceOptions):
     """Texels of the atlas and its textures: the side of a square, 16 to 16384, or WIDTHxHEIGHT, as 2048x1024."""
     padding: int | None = None
     """Texels that are kept free around each chart; by default what the target asks for, else the
-    longer side / 256, at least 2, or less where more than a thousand charts share the page."""
+    longer side / 256, at least 2, or less where charts are so many or so thin that it would take half of the page."""
     texel_density: float | None = None
     """Texels per unit of the source, equal over all files with the same number; by default as many as fit."""
     rotation: Literal["off", "90", "any"] = "any"

@@ -31,11 +31,11 @@ ALIKE = 1e-9
 def pack_square(
     asset: Asset, charts: Charts, square: Square, seed: int = 0, config: PackConfig | None = None
 ) -> Packed:
-    """As ``packing.pack``, at the density asked for, with the padding that so many charts get.
+    """As ``packing.pack``, at the density asked for, with the padding that such charts get.
 
     Raises: as `pack`; InputError where the atlas is too small for that density.
     """
-    own = square.of(len(charts.method))
+    own = square.of(asset.surface.faces, charts)
     found = _at_density(asset, charts, own, seed, config or PackConfig())
     return replace(found, report={**found.report, **square.spared(own)})
 

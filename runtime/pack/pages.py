@@ -58,7 +58,7 @@ def pack_pages(
 
     Raises: as `pack_asked`.
     """
-    asked, config, square = square, square.config(config), square.of(len(charts.method), count)
+    asked, config, square = square, square.config(config), square.of(asset.surface.faces, charts, count)
     page = chart_pages(charts, count)[charts.face_chart]
     used = grouped(page, count)
     found = [_packed(asset, charts, faces, square, seed, config) for faces in used if len(faces)]

@@ -9,33 +9,51 @@ convex region and a distance d.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from ..errors import NoRoomError
 from ..geometry.topology import edge_table, face_components
+from ..geometry.triangles import signed_areas
 from ..options.atlas import SIZES
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
-    from ..mesh import Surface
+    from ..mesh import Charts, Surface
     from ..options.unwrap import Options
     from ..pagesize import PageSize
 
 ROOM = 3.0
 """What is proposed gives a chart, on the mean, a square of so many paddings: two are kept free, one is its own."""
 
-SPARED = 8.0
-"""The side of the square that a chart has on the mean is so many paddings or more, where none was asked for."""
+FILLED, SPARED = 0.6, 0.4
+"""Charts without padding are expected to cover so much of a page; a padding that nobody asked for, so much at most."""
 
 CHARTS_OF_A_PART = 2.0
 """So many are expected, where a proposal is made of the number of parts."""
 
 
-def spared_padding(charts: int, page: PageSize, padding: int, pages: int = 1) -> int:
-    """The padding where none was asked for: this one, or less where so many charts lie on the page; at least 1."""
-    return max(min(padding, int(mean_side(charts, page, pages) / SPARED)), min(padding, 1))
+class Outlines(NamedTuple):
+    """Of charts, in their own units: the area within them, and the length of all outlines."""
+
+    area: float
+    length: float
+
+    @classmethod
+    def of(cls, charts: Charts, edges: NDArray[np.bool_]) -> Outlines:
+        """Of charts with outlines along edges (f, 3)."""
+        step = np.roll(charts.corner_uv, -1, axis=1) - charts.corner_uv
+        length = np.sqrt((step[edges] ** 2).sum(axis=1)).sum()
+        return cls(float(np.abs(signed_areas(charts.corner_uv)).sum()), float(length))
+
+
+def spared_padding(outlines: Outlines, page: PageSize, padding: int, pages: int = 1) -> int:
+    """The padding where none was asked for: this one, or less where outlines are so long; at least 1."""
+    room = float(page.width * page.height * pages)
+    texels = math.sqrt(FILLED * room / max(outlines.area, 1e-300)) * outlines.length  # of all outlines
+    return max(min(padding, int(SPARED * room / max(texels, 1e-300))), min(padding, 1))
 
 
 def mean_side(charts: float, page: PageSize, pages: int = 1) -> float:

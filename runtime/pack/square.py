@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..pagesize import PageSize
 from .config import PackConfig
-from .room import spared_padding
+from .growing.outlines import outline_edges
+from .room import Outlines, spared_padding
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..mesh import Charts
     from ..options.atlas import AtlasOptions
     from ..pagesize import Size
     from .config import Rotation, Stack
@@ -18,7 +23,7 @@ if TYPE_CHECKING:
 class Square(NamedTuple):
     """Size and padding in texels; texels per unit of the source, None as many as fit; the rest as in `PackConfig`.
 
-    spares: nobody asked for that padding, and it may be less where many charts share the page.
+    spares: nobody asked for that padding, and it may be less where charts have long outlines for what they cover.
     """
 
     size: Size
@@ -34,10 +39,12 @@ class Square(NamedTuple):
         """Width and height."""
         return PageSize.of(self.size)
 
-    def of(self, charts: int, pages: int = 1) -> Square:
-        """The same with the padding that so many charts get, on so many pages."""
-        padding = spared_padding(charts, self.page, self.padding, pages) if self.spares else self.padding
-        return self._replace(padding=padding, spares=False)
+    def of(self, faces: NDArray[np.int64], charts: Charts, pages: int = 1) -> Square:
+        """The same with the padding that these charts of faces (f, 3) get, on so many pages."""
+        if not self.spares:
+            return self
+        outlines = Outlines.of(charts, outline_edges(faces, charts))
+        return self._replace(padding=spared_padding(outlines, self.page, self.padding, pages), spares=False)
 
     def spared(self, own: Square) -> dict[str, int]:
         """What a report says of `of`: the padding that few charts get, where these get less."""

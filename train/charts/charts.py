@@ -34,6 +34,7 @@ from .objective import objective, priced, rank
 from .parts import Part, placed, split_parts
 from .planar import flat_regions, least_seam
 from .proof import all_proven, is_valid
+from .ribbons import ribbon
 from .shorten import Page, shortened
 from .slivers import steadied
 from .starts import NOTHING, Starts, best_search
@@ -284,7 +285,8 @@ def unfolded_part(surface: Surface, page: Page, handles: int, config: FinishConf
     dear = config.slit.price * least_seam(surface, table, config.planar.bent) > config.planar.dear
     if count > config.planar.most or (dear and not faceted):
         return None
-    found = unfold(surface, table, region, config.planar, page.side)
+    found = ribbon(surface, table, region, config.planar, page.side)
+    found = found or unfold(surface, table, region, config.planar, page.side)
     if len(found) > config.planar.most_charts + handles:
         return None
     answer = len(found) <= min(config.planar.few, charts) or (faceted and (len(found) <= charts or handles >= charts))

@@ -14,6 +14,7 @@ from flexpara.runtime.options.unwrap import Options
 from flexpara.runtime.pack.config import PlaceConfig
 from flexpara.runtime.pack.layouts.placement import find_layout
 from flexpara.runtime.pack.room import (
+    Outlines,
     demand_room,
     demand_room_for_parts,
     most_charts,
@@ -102,12 +103,17 @@ def test_more_parts_than_a_page_holds_are_refused_before_any_chart_is_looked_for
         demand_room_for_parts(loose(most + 1), other)
 
 
-def test_a_padding_that_nobody_asked_for_leaves_charts_most_of_their_squares() -> None:
+def test_a_padding_that_nobody_asked_for_leaves_charts_most_of_their_page() -> None:
     page = PageSize(2048, 2048)
-    assert [spared_padding(charts, page, 8) for charts in (1, 1024, 1025, 4096, 12_296, 40_000)] == [8, 8, 7, 4, 2, 1]
-    assert spared_padding(40_000, page, 8, pages=16) == 5
-    assert spared_padding(40_000, page, 0) == 0
-    assert spared_padding(10**7, page, 8) == 1
+
+    def squares(count: int) -> Outlines:
+        return Outlines(area=float(count), length=4.0 * count)
+
+    assert [spared_padding(squares(count), page, 8) for count in (1, 1000, 4096, 12_296, 40_000)] == [8, 8, 4, 2, 1]
+    assert spared_padding(squares(40_000), page, 8, pages=16) == 5
+    assert spared_padding(squares(40_000), page, 0) == 0
+    assert spared_padding(squares(10**7), page, 8) == 1
+    assert spared_padding(Outlines(area=5000.0, length=5000.0 * 25.0), page, 8) == 1  # as thin as hair
 
 
 def test_parts_are_not_refused_for_a_padding_that_nobody_asked_for() -> None:
