@@ -44,6 +44,10 @@ class SeamPrices:
         return self if self.places is None else replace(self, places=self.places.moved(origin, scale))
 
 
+PLAIN = SeamPrices()
+"""The same everywhere, but for creases."""
+
+
 class ShortestPaths(NamedTuple):
     """Distances (v,) and the tree from a set of sources: parent (v,), −1 at sources and where nothing leads."""
 
@@ -74,6 +78,12 @@ def place_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDAr
     if prices.places is None:
         return np.ones(len(table.edges))
     return prices.places.at(surface.vertices[table.edges].mean(axis=1))
+
+
+def counted_length(segments: NDArray[np.float64], prices: SeamPrices) -> float:
+    """Length of seams along segments (n, 2, 3) as the objective counts it: times what they cost for where they lie."""
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    return float((length if prices.places is None else length * prices.places.at(segments.mean(axis=1))).sum())
 
 
 def counted_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:

@@ -201,7 +201,7 @@ def laid_alike(search: Search, ids: NDArray[np.int64], seam: NDArray[np.bool_], 
         if apart is None:
             return ids[Overlapping(ids, Flat(disk, uv, {}), slits).pairs().reshape(-1)]
         uv = apart.uv
-    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits, search.config.slit.seams)
 
 
 def relaxed(disk: Surface, uv: NDArray[np.float64], contact: ContactConfig) -> NDArray[np.float64] | None:

@@ -78,7 +78,8 @@ class Room:
         """The edges old (n,), and those that are free no farther off than so many of their mean length."""
         points, edges = self.search.surface.vertices, self.search.table.edges
         path = np.unique(edges[old])
-        reach = width * path_length(self.search, old) * self.search.unit / len(old)
+        ends = points[edges[old]]
+        reach = width * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
         near = np.zeros(len(points), dtype=bool)
         near[np.concatenate(self.tree.query_ball_point(points[path], reach)).astype(np.int64)] = True
         near[self.barred] = False

@@ -101,7 +101,7 @@ def add_island(search: Search, ids: NDArray[np.int64], flat: Flat) -> None:
     if not np.isfinite(flat.uv).all() or flipped_triangles(flat.uv[faces]).any():
         search.add_valid(ids)
         return
-    piece = measured(search.surface, ids, flat, search.area)
+    piece = measured(search.surface, ids, flat, search.area, prices=search.config.slit.seams)
     overlaps = bool(rim_overlaps(faces, boundary_edges(faces), flat.uv))
     carry_piece(search, ids, piece, [Overlapping(ids, flat, ()) if overlaps else piece])
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.cutgraph import PLAIN, counted_length
 from ...runtime.geometry.topology import edge_table
 from ...runtime.geometry.triangles import signed_areas
 from ...runtime.pack.layouts.foreseen import foreseen, silhouette
@@ -20,15 +21,15 @@ if TYPE_CHECKING:
     from ..search.search import Search
 
 
-def objective(surface: Surface, pieces: list[Piece], price: float) -> float:
-    """Σ energy + price · (seams + slits), lengths in √(area of the surface)."""
+def objective(surface: Surface, pieces: list[Piece], price: float, seams: SeamPrices = PLAIN) -> float:
+    """Σ energy + price · (seams + slits), lengths in √(area of the surface), counted by where they lie."""
     label = np.zeros(len(surface.faces), dtype=np.int64)
     for number, piece in enumerate(pieces):
         label[piece.ids] = number
     table = edge_table(surface.faces)
     seam = table.manifold & (label[table.edge_faces[:, 0]] != label[table.edge_faces[:, 1]])
     ends = surface.vertices[table.edges[seam]]
-    border = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / np.sqrt(surface.face_areas().sum()))
+    border = counted_length(ends, seams) / float(np.sqrt(surface.face_areas().sum()))
     return sum(piece.cost(price) for piece in pieces) + price * border
 
 
@@ -56,7 +57,7 @@ def search_cost(search: Search, config: FinishConfig) -> float:
 def rank(pieces: list[Piece], surface: Surface, charts: int, config: FinishConfig) -> tuple[bool, bool, float]:
     """What is better comes first: stretch within bounds, few enough charts, a low objective with the page, or seams."""
     energy = sum(piece.energy for piece in pieces)
-    cost = objective(surface, pieces, config.slit.price) - (energy if config.stretch else 0.0)
+    cost = objective(surface, pieces, config.slit.price, config.slit.seams) - (energy if config.stretch else 0.0)
     cost += wasted(pieces, config)
     return energy > (config.stretch or config.most_excess), len(pieces) > charts, cost
 

@@ -70,7 +70,7 @@ def shortened(surface: Surface, pieces: list[Piece], page: Page, config: FinishC
             continue
         parts = [np.flatnonzero(cut.part == each) for each in range(int(cut.part.max()) + 1)]
         for rows in parts:
-            wait(measured(surface, piece.ids[rows], restricted(piece.flat, rows), 1.0, piece.slits))
+            wait(measured(surface, piece.ids[rows], restricted(piece.flat, rows), 1.0, piece.slits, config.slit.seams))
     return straight_pieces(surface, done, config) if len(done) > len(pieces) else done
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ...runtime.geometry.cutgraph import PLAIN, counted_length
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs, overlaps_anywhere
 from ...runtime.geometry.topology import edge_table, face_components, split_non_manifold_vertices
 from ...runtime.mesh import Surface
@@ -19,6 +20,7 @@ from .slits import Flat
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.geometry.topology import EdgeTable
     from .config import FlapConfig
     from .pieces import Overlapping, Piece
@@ -56,7 +58,9 @@ class Trimmed(NamedTuple):
     rim: float
 
 
-def trimmed(surface: Surface, found: Overlapping, total_area: float, most: float) -> Trimmed | None:
+def trimmed(
+    surface: Surface, found: Overlapping, total_area: float, most: float, prices: SeamPrices = PLAIN
+) -> Trimmed | None:
     """A flattening less the faces that lie over others; None where they are more than the share ``most`` of its area.
 
     What loses its hold on the rest with them goes too.
@@ -73,9 +77,8 @@ def trimmed(surface: Surface, found: Overlapping, total_area: float, most: float
     joined = table.manifold & off[table.edge_faces].all(axis=1)
     flap = face_components(len(faces), table.edge_faces[joined])
     rim = table.manifold & (off[table.edge_faces[:, 0]] != off[table.edge_faces[:, 1]])
-    ends = found.flat.surface.vertices[table.edges[rim]]
-    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) / float(np.sqrt(total_area))
-    piece = measured(surface, found.ids[kept], restricted(found.flat, kept), total_area, found.slits)
+    length = counted_length(found.flat.surface.vertices[table.edges[rim]], prices) / float(np.sqrt(total_area))
+    piece = measured(surface, found.ids[kept], restricted(found.flat, kept), total_area, found.slits, prices)
     flaps = tuple(found.ids[flap == number] for number in np.unique(flap[off]))
     return Trimmed(piece, flaps, length)
 

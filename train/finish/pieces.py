@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from ...runtime.geometry.cutgraph import PLAIN, counted_length
 from ...runtime.geometry.overlap import flipped_triangles, overlapping_pairs
 from ...runtime.geometry.topology import split_non_manifold_vertices
 from ...runtime.geometry.triangles import signed_areas
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...runtime.geometry.cutgraph import SeamPrices
+
     Start = Callable[[Surface], NDArray[np.float64]]
 
     from ..config import FinishConfig
@@ -39,7 +42,8 @@ class Piece:
     """A set of faces and its valid flattening.
 
     ids: (m,) int64.  flat: its faces are in the order of ids.  energy: Σ area · excess over the whole surface's area.
-    slit_length: of all cuts inside the piece, in √A.  slits: those made against stretch, in order.
+    slit_length: of all cuts inside the piece, in √A, as the objective counts it.
+    slits: those made against stretch, in order.
     resort: "xatlas" where all else failed, "projection" where time was out.
     """
 
@@ -102,10 +106,9 @@ def extract(surface: Surface, ids: NDArray[np.int64]) -> Surface:
     return Surface(surface.vertices[old], faces)
 
 
-def border_length(piece: Surface) -> float:
-    """Length of all boundary edges, in source units."""
-    edges = boundary_edges(piece.faces)
-    return float(np.linalg.norm(piece.vertices[edges[:, 1]] - piece.vertices[edges[:, 0]], axis=1).sum())
+def border_length(piece: Surface, prices: SeamPrices = PLAIN) -> float:
+    """Length of all boundary edges, in source units, as the objective counts it at these prices."""
+    return counted_length(piece.vertices[boundary_edges(piece.faces)], prices)
 
 
 def flattened(
@@ -204,17 +207,22 @@ def try_piece(
                 best = best or Overlapping(ids, Flat(disk, uv, {}), (*slits, *more))
                 continue
             uv = apart.uv
-        piece = measured(surface, ids, Flat(disk, uv, {}), total_area, (*slits, *more))
+        piece = measured(surface, ids, Flat(disk, uv, {}), total_area, (*slits, *more), config.slit.seams)
         if not isinstance(best, Piece) or piece.cost(price) < best.cost(price):
             best = piece
     return best
 
 
 def measured(
-    surface: Surface, ids: NDArray[np.int64], flat: Flat, total_area: float, slits: tuple[Slit, ...] = ()
+    surface: Surface,
+    ids: NDArray[np.int64],
+    flat: Flat,
+    total_area: float,
+    slits: tuple[Slit, ...] = (),
+    prices: SeamPrices = PLAIN,
 ) -> Piece:
-    """A flattening of faces of the surface as a piece, with its energy and the length of the cuts in it."""
-    cuts = (border_length(flat.surface) - border_length(extract(surface, ids))) / 2.0
+    """A flattening of faces of the surface as a piece, with its energy and the counted length of the cuts in it."""
+    cuts = (border_length(flat.surface, prices) - border_length(extract(surface, ids), prices)) / 2.0
     energy = excess_energy(flat.surface, flat.uv) / total_area
     return Piece(ids, flat, energy, cuts / float(np.sqrt(total_area)), slits)
 
@@ -223,9 +231,9 @@ def slit_further(piece: Piece, total_area: float, config: SlitConfig, *, contact
     """The piece with the slits that pay.  ``contacts``: those that overlap are held apart (slow), else left out."""
     if not contacts:
         config = replace(config, contact=replace(config.contact, rounds=0))
-    before = border_length(piece.flat.surface)
+    before = border_length(piece.flat.surface, config.seams)
     flat, slits = slit_where_it_pays(piece.flat, total_area, config)
-    length = piece.slit_length + (border_length(flat.surface) - before) / 2.0 / float(np.sqrt(total_area))
+    length = piece.slit_length + (border_length(flat.surface, config.seams) - before) / 2.0 / float(np.sqrt(total_area))
     energy = excess_energy(flat.surface, flat.uv) / total_area
     return Piece(piece.ids, flat, energy, length, (*piece.slits, *slits))
 

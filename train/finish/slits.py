@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from ...runtime.geometry.cutgraph import PLAIN, counted_length
 from ...runtime.geometry.distortion import excess, oriented_energy
 from ...runtime.geometry.topology import EdgeTable, edge_table
 from ...runtime.mesh import Surface
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...runtime.geometry.cutgraph import SeamPrices
     from .config import ContactConfig, SlitConfig
 
 
@@ -147,10 +149,10 @@ def candidate_paths(surface: Surface, table: EdgeTable, target: int, config: Sli
         sources = sources[np.linalg.norm(surface.vertices[sources] - start, axis=1) > apart]
 
 
-def path_length(surface: Surface, path: list[int]) -> float:
-    """Length of a vertex path, in source units."""
+def path_length(surface: Surface, path: list[int], prices: SeamPrices = PLAIN) -> float:
+    """Length of a vertex path, in source units, as the objective counts it at these prices."""
     points = surface.vertices[path]
-    return float(np.linalg.norm(points[1:] - points[:-1], axis=1).sum())
+    return counted_length(np.stack([points[:-1], points[1:]], axis=1), prices)
 
 
 def slit_where_it_pays(flat: Flat, total_area: float, config: SlitConfig) -> tuple[Flat, tuple[Slit, ...]]:
@@ -186,7 +188,7 @@ def best_slit(
 ) -> tuple[Flat, Slit] | None:
     """The first way to slit to a vertex that pays; ``energy`` is the piece's share of excess before."""
     for path in candidate_paths(flat.surface, table, target, config):
-        length = path_length(flat.surface, path) / float(np.sqrt(total_area))
+        length = path_length(flat.surface, path, config.seams) / float(np.sqrt(total_area))
         needed = energy - config.price * max(length, config.shortest)
         trial = slit_to(flat, path, table).relaxed(config.contact, goal=needed * total_area)
         if excess_energy(trial.surface, trial.uv) < needed * total_area:
@@ -220,7 +222,7 @@ def foreseen_slits(curvature: Curvature, total_area: float, config: SlitConfig) 
         wider[path] = True
         trial = curvature.factor(wider)
         left = float(foretold_energies(surface.faces, areas, trial).sum()) / total_area
-        length = path_length(surface, path) / unit
+        length = path_length(surface, path, config.seams) / unit
         if energy - left < config.sure * config.price * max(length, config.shortest):
             spared.append(surface.vertices[tip])
             continue

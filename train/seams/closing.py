@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...runtime.geometry.cutgraph import cut_chains
+from ...runtime.geometry.cutgraph import counted_length, cut_chains
 from ...runtime.geometry.topology import boundary_loops, edge_table, euler_characteristic
 from ...runtime.mesh import Surface
 from ...runtime.process.deadline import Late, never
@@ -203,9 +203,8 @@ class Closing:
 
 
 def path_length(search: Search, edges: NDArray[np.int64]) -> float:
-    """Length of edges, rows of the table (n,), in √A."""
-    ends = search.surface.vertices[search.table.edges[edges]]
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) / search.unit
+    """Length of edges, rows of the table (n,), in √A, as the objective counts it."""
+    return counted_length(search.surface.vertices[search.table.edges[edges]], search.config.slit.seams) / search.unit
 
 
 def laid_open(
@@ -230,7 +229,7 @@ def laid_open(
         return None
     if rim_overlaps(disk.faces, boundary_edges(disk.faces), uv):
         return Overlapping(ids, Flat(disk, uv, {}), slits)
-    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits)
+    return measured(search.surface, ids, Flat(disk, uv, {}), search.area, slits, search.config.slit.seams)
 
 
 def opened_along(
@@ -274,7 +273,9 @@ def valid(
     apart = separate(flat.surface, Relaxed(flat.uv, {}), boundary_edges(flat.surface.faces), contact)
     if apart is None:
         return less
-    whole = measured(search.surface, found.ids, flat._replace(uv=apart.uv), search.area, found.slits)
+    whole = measured(
+        search.surface, found.ids, flat._replace(uv=apart.uv), search.area, found.slits, search.config.slit.seams
+    )
     return Trimmed(whole, (), 0.0) if search.is_bearable(whole) else less
 
 

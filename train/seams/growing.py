@@ -89,7 +89,7 @@ def best_slit(piece: Piece, total_area: float, config: FinishConfig) -> Piece | 
     for way in work.ways(work.uncut())[: config.closing.growing.tries]:
         flat = slit_to(piece.flat, way.path, work.table).relaxed(config.slit.contact)
         energy = excess_energy(flat.surface, flat.uv) / total_area
-        length = path_length(piece.flat.surface, way.path) / work.unit
+        length = path_length(piece.flat.surface, way.path, config.slit.seams) / work.unit
         gain = (piece.energy - energy) / max(length, least)
         if gain > most:
             slit = Slit(piece.flat.surface.vertices[way.path[::-1]])
@@ -181,5 +181,5 @@ class Growing:
         rim = state.rim.copy()
         rim[path] = True
         after = self.state(state.cut | path_mask(self.table, [path]), rim)
-        length = path_length(self.surface, path) / self.unit
+        length = path_length(self.surface, path, self.config.slit.seams) / self.unit
         return Way((state.energy - after.energy) / max(length, self.growing.shortest), path, after)

@@ -36,7 +36,11 @@ def laid_within(search: Search, found: Overlapping, goal: float, given: Start | 
     uv = held_apart(disk, start, contact.scaffold, goal * search.area) if is_valid(disk, start) else None
     if uv is None or not is_valid(disk, uv):
         return None
-    return Trimmed(measured(search.surface, found.ids, Flat(disk, uv, {}), search.area, found.slits), (), 0.0)
+    return Trimmed(
+        measured(search.surface, found.ids, Flat(disk, uv, {}), search.area, found.slits, search.config.slit.seams),
+        (),
+        0.0,
+    )
 
 
 def without_flips(disk: Surface, uv: NDArray[np.float64], steps: int) -> NDArray[np.float64] | None:

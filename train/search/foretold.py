@@ -58,4 +58,6 @@ class Foretold:
         run = face_components(len(used), index)[index[:, 0]]
         points = self.surface.vertices[ends]
         length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        if self.config.slit.seams.places is not None:
+            length = length * self.config.slit.seams.places.at(points.mean(axis=1))
         return float(np.bincount(run, length).max(initial=0.0)) / self.unit

@@ -177,7 +177,9 @@ class Search(State):
         """Some faces of a piece: laid out anew, or as they lie in it, relaxed or not, whichever costs least."""
         rows = np.flatnonzero(np.isin(piece.ids, ids))
         flat = restricted(piece.flat, rows)
-        kept = Trimmed(measured(self.surface, piece.ids[rows], flat, self.area, piece.slits), (), 0.0)
+        kept = Trimmed(
+            measured(self.surface, piece.ids[rows], flat, self.area, piece.slits, self.config.slit.seams), (), 0.0
+        )
         free = converge(flat.surface, Relaxed(flat.uv, {}), np.inf, self.config.slit.contact)
         relaxed = Overlapping(piece.ids[rows], flat._replace(uv=free), piece.slits)
         ways = [kept, self.trimmed(relaxed), self.less_flaps(self.try_piece(ids))]

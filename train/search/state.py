@@ -109,7 +109,7 @@ class State:
 
     def trimmed(self, found: Overlapping) -> Trimmed | None:
         """A flattening less its flaps; None where they are too large, or the rest too stretched."""
-        less = trimmed(self.surface, found, self.area, self.config.flaps.most)
+        less = trimmed(self.surface, found, self.area, self.config.flaps.most, self.config.slit.seams)
         return less if less is not None and self.is_bearable(less.piece) else None
 
     def is_bearable(self, piece: Piece) -> bool:
@@ -182,7 +182,11 @@ class State:
         for key in keys[np.lexsort((-length[keys], keys == label[owner]))].tolist():
             piece = self.pieces[key]
             found = attached(piece, self.surface, self.table, flap, self.config.flaps)
-            wider = None if found is None else measured(self.surface, *found, self.area, piece.slits)
+            wider = (
+                None
+                if found is None
+                else measured(self.surface, *found, self.area, piece.slits, self.config.slit.seams)
+            )
             if wider is not None and self.is_bearable(wider):
                 del self.pieces[key]  # under its key merges of the smaller piece are known
                 self.add(wider)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexpara.runtime.geometry.cutgraph import SeamPrices, counted_prices, seam_prices
+from flexpara.runtime.geometry.cutgraph import SeamPrices, counted_length, counted_prices, seam_prices
 from flexpara.runtime.geometry.openness import open_sky
 from flexpara.runtime.geometry.places import PlaceConfig, Places, priced_places
 from flexpara.runtime.geometry.topology import edge_table
@@ -61,3 +61,10 @@ def test_a_place_multiplies_what_seams_cost_and_count_and_counted_creases_make_b
     assert np.array_equal(counted_prices(cube, table, SeamPrices()), np.ones(len(table.edges)))
     counted = counted_prices(cube, table, SeamPrices(counted=True))
     assert np.allclose(np.unique(counted.round(9)), [0.2, 1.0])
+
+
+def test_a_segment_counts_as_long_as_its_place_is_dear() -> None:
+    segments = np.array([[[0.0, 0, 0], [2.0, 0, 0]], [[9.0, 0, 0], [10.0, 0, 0]]])
+    dear = SeamPrices(places=Places(np.array([[0.0, 0, 0], [10.0, 0, 0]]), np.array([1.0, 5.0])))
+    assert counted_length(segments, SeamPrices()) == 3.0
+    assert counted_length(segments, dear) == 2.0 + 5.0
