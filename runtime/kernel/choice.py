@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import ModuleType
 
-EDITION = 11
+EDITION = 12
 """Of the kernel's functions; one more wherever they change."""
 SWITCH = "FLEXPARA_KERNEL"
 """Environment variable: "off" for the twins."""

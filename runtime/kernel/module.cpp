@@ -1,12 +1,14 @@
 // The compiled kernel as a Python module.  Arrays in, arrays out; Python's lock is released while anything is computed.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include <limits>
 
 #include "cloud.hpp"
 #include "conformal.hpp"
 #include "exact.hpp"
+#include "nest.hpp"
 #include "paths.hpp"
 #include "polish.hpp"
 #include "rigid.hpp"
@@ -359,9 +361,47 @@ static void define_packing(py::module_& module) {
     });
 }
 
+static void define_nesting(py::module_& module) {
+    // masks: a list of (h, w) arrays a chart.  (layouts, k, 3): turn, column and row of each chart.
+    module.def("shrunk", [](const py::list& masks, int quarters, std::array<double, 2> share, const Indices& start,
+                            const py::tuple& numbers, std::uint64_t seed) {
+        std::vector<std::vector<Bitmap>> charts;
+        Lying first;
+        demand(start.ndim() == 2 && start.shape(0) == py::ssize_t(masks.size()) && start.shape(1) == 3 &&
+               masks.size() > 1, "a start of other charts");
+        for (const auto& turns : masks) {
+            std::vector<Bitmap> own;
+            for (const auto& one : turns) {
+                const auto cells = py::cast<Mask>(one);
+                demand(cells.ndim() == 2 && cells.size() > 0 && cells.size() < (1 << 24), "cells of no bitmap");
+                own.emplace_back(cells.data(), int(cells.shape(0)), int(cells.shape(1)));
+            }
+            const Index* at = start.data() + 3 * charts.size();
+            demand(quarters > 0 && own.size() % quarters == 0 && at[0] >= 0 && at[0] < Index(own.size()) && own.size() < (1 << 16),
+                   "a turn that no mask has");
+            first.turn.push_back(int(at[0]));
+            first.place.push_back({int(at[1]), int(at[2])});
+            charts.push_back(std::move(own));
+        }
+        const Separating asked{numbers[0].cast<double>(), numbers[1].cast<int>(), numbers[2].cast<int>(),
+                               numbers[3].cast<int>(), numbers[4].cast<int>(), numbers[5].cast<float>(),
+                               numbers[6].cast<float>(), numbers[7].cast<float>(), numbers[8].cast<std::size_t>()};
+        std::vector<Lying> found;
+        {
+            py::gil_scoped_release free;
+            found = Separation(std::move(charts), quarters, share, asked, seed).shrunk(std::move(first));
+        }
+        std::vector<Index> flat;
+        for (const auto& one : found)
+            for (std::size_t i = 0; i < one.turn.size(); ++i)
+                flat.insert(flat.end(), {one.turn[i], one.place[i][0], one.place[i][1]});
+        return array_of(flat, 3);
+    });
+}
+
 PYBIND11_MODULE(compiled, module) {
     module.doc() = "Kernels of flexpara in C++; each has a twin in Python that says what it does.";
-    module.attr("edition") = 11;
+    module.attr("edition") = 12;
     define_pieces(module);
     define_solvers(module);
     define_overlap(module);
@@ -369,4 +409,5 @@ PYBIND11_MODULE(compiled, module) {
     define_clouds(module);
     define_packing(module);
     define_unfolding(module);
+    define_nesting(module);
 }
