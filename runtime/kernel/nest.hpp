@@ -17,7 +17,7 @@ namespace flexpara {
 struct Separating {
     double work;
     int turns, patience, step, kept;
-    float least, steeper, lighter;
+    float heavier, steeper, lighter;
     std::size_t memory;
 };
 
@@ -328,7 +328,7 @@ class Separation {
         const int deepest = *std::max_element(depth_.begin(), depth_.end());
         for (std::size_t i = 0; i < depth_.size(); ++i) {
             const float share = float(depth_[i]) / float(deepest);
-            const float factor = depth_[i] > 0 ? numbers_.least + numbers_.steeper * share : numbers_.lighter;
+            const float factor = depth_[i] > 0 ? numbers_.heavier + numbers_.steeper * share : numbers_.lighter;
             weight_[i] = std::max(weight_[i] * factor, 1.0f);
         }
     }

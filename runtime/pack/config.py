@@ -67,6 +67,48 @@ class NestConfig:
 
 
 @dataclass(frozen=True)
+class SeparationConfig:
+    """A layout of bitmaps on smaller and smaller pages, where charts that overlap are moved until none does."""
+
+    start: NestConfig = field(default_factory=lambda: NestConfig(side=128))
+    """The layout that is begun with."""
+    most: int = 40
+    """Charts up to which it is tried."""
+    slants: int = 8
+    """Angles within a quarter turn at which charts are tried …"""
+    large: float = 0.08
+    """… that have at least this share of the area of all …"""
+    few: int = 2
+    """… and the others."""
+    work: float = 3e8
+    """Cells of tables that are read in all; a table that is made counts five times."""
+    slower: float = 0.1
+    """Share of that which is done where nothing was compiled."""
+    turns: int = 5
+    """Turns by chance at which a chart is tried when it is moved, beside its own and the two next to it."""
+    patience: int = 15
+    """Rounds over all charts without less overlap after which a page is given up."""
+    step: int = 2
+    """Cells by which the page's side shrinks, until it was given up once; then one."""
+    kept: int = 3
+    """Layouts kept, the last ones found."""
+    heavier: float = 1.2
+    """Factor on the weight of a pair that overlaps, after each round …"""
+    steeper: float = 0.8
+    """… and how much more of it for the deepest overlap …"""
+    lighter: float = 0.95
+    """… and of a pair that does not."""
+    memory: int = 1 << 26
+    """Cells of tables from which on they are forgotten and made again, after a round."""
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All of them, in the order in which the kernel takes them."""
+        shares = self.heavier, self.steeper, self.lighter
+        return self.work, self.turns, self.patience, self.step, self.kept, *shares, self.memory
+
+
+@dataclass(frozen=True)
 class ForeseenConfig:
     """What charts will cover of a page, foreseen without packing them."""
 
@@ -118,6 +160,8 @@ class GrowthConfig:
     """Segments this much farther apart than the closest ones still count as facing each other, share."""
     sample: float = 1.0 / 256.0
     """Distance of the samples by which facing segments are found, share."""
+    turn: float = 0.03
+    """Most by which a chart is turned in a step, radians."""
     straight: float = 0.75
     """Share of an outline along the axes from which a chart is not turned …"""
     askew: float = 0.5
@@ -185,11 +229,14 @@ class PackConfig:
     rows: RowConfig = field(default_factory=RowConfig)
     place: PlaceConfig = field(default_factory=PlaceConfig)
     nest: NestConfig = field(default_factory=NestConfig)
+    separation: SeparationConfig = field(default_factory=SeparationConfig)
     growth: GrowthConfig = field(default_factory=GrowthConfig)
     lattice: LatticeConfig = field(default_factory=LatticeConfig)
     density: DensityConfig = field(default_factory=DensityConfig)
     islands: IslandConfig = field(default_factory=IslandConfig)
     stacks: StackConfig = field(default_factory=StackConfig)
+    finalists: int = 2
+    """Layouts that grow until they jam; of more, those that have grown most after one round."""
     recuts: int = 4
     """How often charts that float32 can't hold are drawn larger or cut again, and all are packed anew."""
     least_edge: float = 1.6e-5

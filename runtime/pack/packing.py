@@ -29,7 +29,7 @@ from .exact.lattice import STEPS
 from .exact.seamvertices import atlas_normals, split_vertices
 from .growing.growth import grown
 from .growing.outlines import chart_outlines, is_straight, outline_edges, rotation, upright_angle
-from .layouts.nesting import find_nested
+from .layouts.nesting import find_nested, find_separated
 from .layouts.placement import Layout, find_layout
 from .layouts.texels import aligned
 from .room import demand_room, no_room
@@ -116,6 +116,8 @@ def _close_together(sheet: Sheet, config: PackConfig, seed: int) -> tuple[Fitted
     """Charts grown from the better of their first placements, and what limits them."""
     mesh, charts, edges, page, padding = sheet
     places, report = _placed(charts, chart_outlines(charts, edges), page, padding, config, seed)
+    if len(places) > config.finalists:
+        places = _finalists(charts, edges, [_Place(first, page, padding) for first in places], config)
     jammed = [_grown(charts, edges, _Place(first, page, padding), config, 2.0) for first in places]
     best = max(range(len(jammed)), key=lambda number: scale_of(jammed[number][0]))
     fit = partial(fitted_charts, mesh, charts, edges, _Place(places[best], page, padding), config)
@@ -127,6 +129,15 @@ def _close_together(sheet: Sheet, config: PackConfig, seed: int) -> tuple[Fitted
     return fitted, report
 
 
+def _finalists(
+    charts: Charts, edges: NDArray[np.bool_], places: list[_Place], config: PackConfig
+) -> list[NDArray[np.float64]]:
+    """The placements (k, 2, 3) in which charts have grown most after one round, as they are then."""
+    quick = replace(config, growth=replace(config.growth, rounds=1))
+    begun = [_grown(charts, edges, place, quick, 2.0)[0] for place in places]
+    return sorted(begun, key=scale_of, reverse=True)[: config.finalists]
+
+
 def _placed(
     charts: Charts, outlines: list[NDArray[np.float64]], page: PageSize, padding: int, config: PackConfig, seed: int
 ) -> tuple[list[NDArray[np.float64]], dict[str, Any]]:
@@ -135,13 +146,17 @@ def _placed(
     if config.rotation == "any":
         angles = np.array([upright_angle(outline, page.extent if len(outlines) == 1 else None) for outline in outlines])
     upright = [outline @ rotation(angle).T for outline, angle in zip(outlines, angles, strict=True)]
-    area = float(np.abs(signed_areas(charts.corner_uv)).sum())
+    areas = np.bincount(charts.face_chart, np.abs(signed_areas(charts.corner_uv))).astype(np.float64)
+    area = float(areas.sum())
     # a hair more than the padding: charts that touch could not be parted by letting them shrink
     room, extent = padding / page.side + 4.0 / STEPS, page.extent
-    turns, rngs = config.rotation, [np.random.default_rng(seed) for _ in range(2)]
+    turns, rngs = config.rotation, [np.random.default_rng(seed) for _ in range(3)]
     layout = find_layout(upright, area, room, config.place, rngs[0], rotation=turns, extent=extent)
-    nested = find_nested(upright, _folded(charts), area, room, config.nest, rngs[1], rotation=turns, extent=extent)
+    folded = _folded(charts)
+    nested = find_nested(upright, folded, area, room, config.nest, rngs[1], rotation=turns, extent=extent)
     layouts = [layout] if nested is None else [layout, nested]
+    apart = config.separation
+    layouts += find_separated(upright, folded, areas, room, apart, rngs[2], rotation=turns, extent=extent)
     length = np.array([np.ptp(outline.reshape(-1, 2), axis=0).max() for outline in upright])
     longest = int(length.argmax())
     limits = {

@@ -89,19 +89,20 @@ def grown(
 def jammed(
     crowd: Crowd, turning: NDArray[np.bool_], border: float, apart: float, config: GrowthConfig
 ) -> tuple[Crowd, NDArray[np.float64], int]:
-    """The crowd after rounds of linear programs, each kept where charts really grew.
+    """The crowd after rounds of linear programs, each kept where charts really grew; else the next one turns none.
 
     Also by how much charts (k,) were turned, and how many programs had no solution.
     """
     k, skipped = len(crowd.centre), 0
     trust = config.trust / max(1.0, math.sqrt(k / config.crowd))
     corners = _corners(crowd)
-    angle = np.zeros(k)
+    angle, turn = np.zeros(k), config.turn
     for _ in range(config.rounds if k <= config.few else 0):
         pairs = facing_segments(crowd.segments(), crowd.chart, spacing=config.sample, reach=config.reach)
+        facing = _Facing(pairs, corners, np.where(turning, turn, 0.0))
         moved, turned = crowd, angle
         for step in range(config.steps):
-            found = _step(moved, _Facing(pairs, corners, turning), border, apart, trust * config.calmer**step)
+            found = _step(moved, facing, border, apart, trust * config.calmer**step)
             if found is None:
                 skipped += 1
             else:
@@ -110,17 +111,24 @@ def jammed(
             moved = padded(moved, border, apart, config)
         except FinishError:  # charts in each other's bays went through each other: this round is undone
             moved = replace(crowd, factor=0.0)
-        trust *= config.calmer**config.steps if moved.factor > crowd.factor else config.smaller
-        crowd, angle = (moved, turned) if moved.factor > crowd.factor else (crowd, angle)
+        if moved.factor > crowd.factor:
+            crowd, angle, trust, turn = moved, turned, trust * config.calmer**config.steps, config.turn
+        elif turn > 0.0 and turning.any():
+            turn = 0.0
+        else:
+            trust, turn = trust * config.smaller, config.turn
     return crowd, angle, skipped
 
 
 class _Facing(NamedTuple):
-    """What may come to touch: pairs (p, 2) of segments, corners (c,) of charts' hulls; charts (k,) that may turn."""
+    """What may come to touch: pairs (p, 2) of segments, corners (c,) of charts' hulls.
+
+    turning: (k,) by how much charts may turn in a step, radians.
+    """
 
     pairs: NDArray[np.int64]
     corners: NDArray[np.int64]
-    turning: NDArray[np.bool_]
+    turning: NDArray[np.float64]
 
 
 def _corners(crowd: Crowd) -> NDArray[np.int64]:
@@ -145,7 +153,7 @@ def _step(
     walls, wall_room = _wall_rows(crowd, facing.corners, radius, border)
     close = wall_room <= 4.0 * trust
     growth = trust / float(crowd.half.max())
-    turns = np.where(facing.turning, trust, 0.0)
+    turns = np.minimum(trust, facing.turning * radius)
     limits = [(-trust, trust)] * (2 * k) + [(-turn, turn) for turn in turns.tolist()] + [(-growth, growth)]
     objective = np.zeros(3 * k + 1)
     objective[-1] = -1.0
