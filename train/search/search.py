@@ -182,7 +182,8 @@ class Search(State):
         )
         free = converge(flat.surface, Relaxed(flat.uv, {}), np.inf, self.config.slit.contact)
         relaxed = Overlapping(piece.ids[rows], flat._replace(uv=free), piece.slits)
-        ways = [kept, self.trimmed(relaxed), self.less_flaps(self.try_piece(ids))]
+        less = self.trimmed(relaxed) if np.isfinite(free).all() else None  # slivers may have no end
+        ways = [kept, less, self.less_flaps(self.try_piece(ids))]
         return min((way for way in ways if way is not None), key=self.cost)
 
     def begin(self, late: Late = never) -> Self:
