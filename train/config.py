@@ -188,6 +188,16 @@ class PageConfig:
 
 
 @dataclass(frozen=True)
+class CrumbConfig:
+    """Pieces too small to be charts of their own."""
+
+    share: float = 0.004
+    """Share of a part's area below which a piece joins one beside it …"""
+    price: float = 0.0002
+    """… where that costs no more of the objective than this: what a small chart costs in padding and in work."""
+
+
+@dataclass(frozen=True)
 class SymmetryConfig:
     """Mirrored charts."""
 
@@ -209,6 +219,7 @@ class FinishConfig:
     """Mean excess energy that each part may have for the sake of short seams; 0: the price of slits decides alone."""
     closing: ClosingConfig = field(default_factory=ClosingConfig)
     """How seams are closed."""
+    crumbs: CrumbConfig = field(default_factory=CrumbConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     slit: SlitConfig = field(default_factory=SlitConfig)
     planar: PlanarConfig = field(default_factory=PlanarConfig)

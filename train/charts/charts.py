@@ -265,6 +265,7 @@ def brought_back(levels: tuple[Surface, Surface, Surface], ways: list[Way], star
         straight = [straightened(way, config.bands_carried) for way in found] if coarse is not middle else found
         found = settled(straight, charts, config, late)
     found.mend()
+    found.join_crumbs(late)
     pieces = list(found.pieces.values())
     if starts.carried and not (config.stretch or late()):
         pieces = shortened(middle, pieces, page if middle is surface else page._replace(polygon=None), config)

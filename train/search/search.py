@@ -227,6 +227,26 @@ class Search(State):
         if len(self.pieces) > most and self.objective() > cost:
             self.pieces = before
 
+    def join_crumbs(self, late: Late = never) -> None:
+        """Pieces too small to be charts of their own, the least first, each merged with one beside it where that is valid.
+
+        It may cost no more than a crumb is worth, and the stretch stays within its bound.
+        """
+        crumbs = self.config.crumbs
+        size = {key: float(self.areas[piece.ids].sum()) / self.area for key, piece in self.pieces.items()}
+        for key in sorted((key for key in size if size[key] < crumbs.share), key=lambda key: size[key]):
+            if key not in self.pieces or late():
+                continue
+            borders = {pair: length for pair, length in self.borders().items() if key in pair}
+            self.try_merges(list(borders))
+            before, bound = dict(self.pieces), max(self.config.stretch or np.inf, self.energy())
+            for pair in sorted(borders, key=lambda pair: -borders[pair]):
+                merged = self.tried[pair]
+                if merged and self.exchange(pair, [merged], -crumbs.price, len(before) - 1):
+                    if self.energy() <= bound:
+                        break
+                    self.pieces = dict(before)
+
     def worst(self) -> int | None:
         """The key of the piece of highest cost that is not settled; None where none could gain from a split."""
         keys = [key for key in self.pieces if key not in self.settled]
