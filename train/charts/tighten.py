@@ -44,7 +44,7 @@ def way_down(search: Search, charts: int, starts: Starts) -> Way:
         thinner = len(search.surface.faces) < len(starts.part.surface.faces)
         search = tightened(search, charts, config, late, proxy=thinner)
     straight = search if starts.holed else straightened(search, config.bands)
-    if few or crowded or config.page.free:
+    if few or crowded:
         return Way(straight, straight, forced=few)
     return closed(straight, charts, 0 if starts.small else config.page.tries, late)
 

@@ -55,6 +55,41 @@ def assert_valid(search: Search) -> None:
         assert len(overlapping_pairs(uv)) == 0
 
 
+def with_crumb(faces: int) -> Search:
+    """A tube in two halves, so many connected faces of which are a piece of their own."""
+    tube = unit("tube", 25)
+    label = bands(tube, 2)
+    graph = dual_graph(tube, edge_table(tube.faces), SeamPrices())
+    inside = {int(np.argmin(tube.triangles.mean(axis=1)[:, 2]))}
+    while len(inside) < faces:
+        inside |= set(graph.pairs[np.isin(graph.pairs, sorted(inside)).any(axis=1)].reshape(-1).tolist())
+    label[sorted(inside)[:faces]] = 2
+    return search_of(tube, label)
+
+
+def test_a_crumb_joins_the_piece_around_it() -> None:
+    search = with_crumb(1)
+    before = search.objective()
+    search.join_crumbs()
+    assert len(search.pieces) == 2
+    assert search.objective() < before
+    assert_valid(search)
+
+
+def test_a_piece_that_is_no_crumb_stays_a_chart() -> None:
+    search = with_crumb(1)
+    share = float(search.areas.min()) / search.area
+    search.config = replace(CONFIG, crumbs=replace(CONFIG.crumbs, share=0.5 * share))
+    search.join_crumbs()
+    assert len(search.pieces) == 3
+
+
+def test_no_crumb_joins_another_piece_once_it_is_late() -> None:
+    search = with_crumb(1)
+    search.join_crumbs(lambda: True)
+    assert len(search.pieces) == 3
+
+
 def test_the_objective_of_a_tube_in_two_halves_is_the_price_of_its_seams() -> None:
     tube = unit("tube", 25)  # 16 rows: the halves meet along a circle
     search = search_of(tube, bands(tube, 2))
