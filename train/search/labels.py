@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...runtime.geometry.cutgraph import SeamPrices
     from ...runtime.geometry.topology import EdgeTable
     from ...runtime.mesh import Surface
-    from ..config import LabelConfig
+    from .config import LabelConfig
 
 
 class DualGraph(NamedTuple):

@@ -228,7 +228,7 @@ class Search(State):
             self.pieces = before
 
     def join_crumbs(self, late: Late = never) -> None:
-        """Pieces too small to be charts of their own, the least first, each merged with one beside it where that is valid.
+        """Pieces too small to be charts of their own, the least first, each merged with one beside it if that is valid.
 
         It may cost no more than a crumb is worth, and the stretch stays within its bound.
         """

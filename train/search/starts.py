@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...runtime.mesh import Surface
-    from ..config import FinishConfig, LabelConfig, StartConfig
+    from ..config import FinishConfig
+    from .config import LabelConfig, StartConfig
     from .labels import DualGraph
 
 

@@ -23,8 +23,9 @@ from flexpara.train.charts.charts import Finished, chart_surface
 from flexpara.train.charts.objective import objective
 from flexpara.train.charts.proof import verify
 from flexpara.train.charts.starts import Known
-from flexpara.train.config import FinishConfig, StartConfig
+from flexpara.train.config import FinishConfig
 from flexpara.train.finish.flatten import jacobians
+from flexpara.train.search.config import StartConfig
 from flexpara.train.search.search import Search
 
 if TYPE_CHECKING:

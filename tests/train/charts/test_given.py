@@ -16,7 +16,8 @@ from flexpara.train.charts.charts import Finished, chart_surface
 from flexpara.train.charts.given import made_valid
 from flexpara.train.charts.proof import verify
 from flexpara.train.charts.starts import NOTHING, Known
-from flexpara.train.config import FinishConfig, PageConfig, StartConfig
+from flexpara.train.config import FinishConfig, PageConfig
+from flexpara.train.search.config import StartConfig
 
 CONFIG = FinishConfig(start=StartConfig(counts=(1.0,)), page=PageConfig(price=0.0, tries=0))
 LAZY = replace(CONFIG, rounds=0, start=StartConfig(counts=(4.0,)), doubt=-1.0, stretched=9.0)

@@ -16,9 +16,10 @@ from flexpara.train.charts.charts import Finished, chart_surface
 from flexpara.train.charts.mirror import mirror_of, mirrored_charts
 from flexpara.train.charts.parts import extracted
 from flexpara.train.charts.proof import verify
-from flexpara.train.config import FinishConfig, StartConfig, SymmetryConfig
+from flexpara.train.config import FinishConfig, SymmetryConfig
 from flexpara.train.finish.config import EnergyConfig
 from flexpara.train.finish.pieces import Piece
+from flexpara.train.search.config import StartConfig
 
 CONFIG = FinishConfig(start=StartConfig(counts=(1.0,)))
 

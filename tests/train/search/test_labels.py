@@ -11,7 +11,7 @@ from flexpara.runtime.geometry.cutgraph import SeamPrices
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.runtime.samples import make_sample
-from flexpara.train.config import LabelConfig
+from flexpara.train.search.config import LabelConfig
 from flexpara.train.search.labels import (
     DualGraph,
     border_lengths,
