@@ -61,15 +61,17 @@ def on_the_border(search: Search) -> NDArray[np.bool_]:
 
 
 def stars(found: list[Chain], border: NDArray[np.bool_], longest: int) -> list[Star]:
-    """The stars of all junctions off the border where three chains or more meet, no chain twice."""
+    """The stars of all junctions off the border where three arms or more meet; those of one ring are parts of it."""
     arms: dict[int, list[tuple[int, NDArray[np.int64]]]] = {}
     for number, chain in enumerate(found):
+        ring = chain.path[0] == chain.path[-1]
+        edges = min(longest, len(chain.edges) // 3) if ring else longest
         for path in (chain.path, chain.path[::-1]):
-            arms.setdefault(int(path[0]), []).append((number, path[: longest + 1]))
+            arms.setdefault(int(path[0]), []).append((number, path[: edges + 1]))
     met = []
     for vertex, ends in sorted(arms.items()):
         numbers = frozenset(number for number, _ in ends)
-        if len(ends) < 3 or len(numbers) < len(ends) or border[vertex]:
+        if len(ends) < 3 or min(len(path) for _, path in ends) < 2 or border[vertex]:
             continue
         sides = sorted({side for number in numbers for side in found[number].sides})
         met.append(Star([path for _, path in ends], numbers, tuple(sides)))

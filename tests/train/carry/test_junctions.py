@@ -10,11 +10,12 @@ import pytest
 pytest.importorskip("igl")
 
 from flexpara.runtime.geometry.cutgraph import SeamPrices
+from flexpara.runtime.geometry.straightpaths import Roads
 from flexpara.runtime.geometry.topology import edge_table
 from flexpara.runtime.mesh import Surface
 from flexpara.train.carry.arcs import Straightening
 from flexpara.train.carry.exchange import turned
-from flexpara.train.carry.junctions import stars, straighter_junctions
+from flexpara.train.carry.junctions import shortest_star, stars, straighter_junctions
 from flexpara.train.config import FinishConfig
 from flexpara.train.seams.network import chains, seam_edges
 from flexpara.train.search.labels import dual_graph
@@ -76,6 +77,24 @@ def test_junctions_have_an_arm_for_each_chain_and_border_ends_are_none() -> None
     assert sorted(len(arm) for arm in star.arms) == [5, 5, 5]
     assert len({int(arm[0]) for arm in star.arms}) == 1
     assert len(star.sides) == 3
+
+
+def test_a_junction_on_a_ring_moves_along_it() -> None:
+    label = np.zeros((SIDE, SIDE), dtype=np.int64)
+    label[3:9, 3:9] = 1
+    search = sheet(label)
+    seam = seam_edges(search)
+    points, edges = search.surface.vertices * SIDE, search.table.edges
+    # a cut from the ring's side outwards, a step aside and on
+    for a, b in (((9, 5), (10, 5)), ((10, 5), (10, 6)), ((10, 6), (11, 6))):
+        ends = [np.flatnonzero((points[:, 0].round() == i) & (points[:, 1].round() == j))[0] for i, j in (a, b)]
+        seam[(np.sort(edges, axis=1) == np.sort(ends)).all(axis=1)] = True
+    found = chains(search, seam)
+    (star,) = stars(found, np.zeros(len(points), dtype=bool), 4)
+    assert len(star.arms) == 3
+    assert len(star.chains) == 2
+    ways = shortest_star(Roads(points, edges, np.ones(len(edges))), star, 0.3)
+    assert sum(len(way) - 1 for way in ways) < sum(len(arm) - 1 for arm in star.arms)
 
 
 def test_a_staircase_turns_more_than_a_straight_border() -> None:
