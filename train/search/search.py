@@ -181,9 +181,9 @@ class Search(State):
             measured(self.surface, piece.ids[rows], flat, self.area, piece.slits, self.config.slit.seams), (), 0.0
         )
         free = converge(flat.surface, Relaxed(flat.uv, {}), np.inf, self.config.slit.contact)
-        relaxed = Overlapping(piece.ids[rows], flat._replace(uv=free), piece.slits)
-        less = self.trimmed(relaxed) if np.isfinite(free).all() else None  # slivers may have no end
-        ways = [kept, less, self.less_flaps(self.try_piece(ids))]
+        ways = [kept, self.less_flaps(self.try_piece(ids))]
+        if free is not None and np.isfinite(free).all():  # slivers may have no end
+            ways.append(self.trimmed(Overlapping(piece.ids[rows], flat._replace(uv=free), piece.slits)))
         return min((way for way in ways if way is not None), key=self.cost)
 
     def begin(self, late: Late = never) -> Self:
@@ -228,24 +228,31 @@ class Search(State):
             self.pieces = before
 
     def join_crumbs(self, late: Late = never) -> None:
-        """Pieces too small to be charts of their own, the least first, each merged with one beside it if that is valid.
+        """Pieces too small to be charts of their own join one beside them, the least first, where that is valid.
 
         It may cost no more than a crumb is worth, and the stretch stays within its bound.
         """
-        crumbs = self.config.crumbs
-        size = {key: float(self.areas[piece.ids].sum()) / self.area for key, piece in self.pieces.items()}
-        for key in sorted((key for key in size if size[key] < crumbs.share), key=lambda key: size[key]):
-            if key not in self.pieces or late():
-                continue
-            borders = {pair: length for pair, length in self.borders().items() if key in pair}
-            self.try_merges(list(borders))
-            before, bound = dict(self.pieces), max(self.config.stretch or np.inf, self.energy())
-            for pair in sorted(borders, key=lambda pair: -borders[pair]):
-                merged = self.tried[pair]
-                if merged and self.exchange(pair, [merged], -crumbs.price, len(before) - 1):
-                    if self.energy() <= bound:
-                        break
-                    self.pieces = dict(before)
+        crumbs, vain = self.config.crumbs, set[int]()
+        while not late():
+            size = {key: float(self.areas[piece.ids].sum()) / self.area for key, piece in self.pieces.items()}
+            small = [key for key in size if key not in vain and size[key] < crumbs.share]
+            if not small:
+                return
+            least = min(small, key=lambda key: size[key])
+            vain.add(least)
+            self.join_crumb(least)
+
+    def join_crumb(self, key: int) -> None:
+        """Merge a crumb with the first piece that takes it, that of longest common border asked first."""
+        borders = {pair: length for pair, length in self.borders().items() if key in pair}
+        self.try_merges(list(borders))
+        before, bound = dict(self.pieces), max(self.config.stretch or np.inf, self.energy())
+        for pair in sorted(borders, key=lambda pair: -borders[pair]):
+            merged = self.tried[pair]
+            if merged and self.exchange(pair, [merged], -self.config.crumbs.price, len(before) - 1):
+                if self.energy() <= bound:
+                    return
+                self.pieces = dict(before)
 
     def worst(self) -> int | None:
         """The key of the piece of highest cost that is not settled; None where none could gain from a split."""

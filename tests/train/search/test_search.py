@@ -76,6 +76,16 @@ def test_a_crumb_joins_the_piece_around_it() -> None:
     assert_valid(search)
 
 
+def test_two_crumbs_side_by_side_become_no_third_one() -> None:
+    search = with_crumb(2)
+    (key,) = (key for key, piece in search.pieces.items() if len(piece.ids) == 2)
+    pair = search.pieces.pop(key).ids
+    search.add_all_valid([(pair[:1], ()), (pair[1:], ())])
+    search.join_crumbs()
+    assert sorted(len(piece.ids) for piece in search.pieces.values())[0] > 2
+    assert_valid(search)
+
+
 def test_a_piece_that_is_no_crumb_stays_a_chart() -> None:
     search = with_crumb(1)
     share = float(search.areas.min()) / search.area
