@@ -38,7 +38,7 @@ from .ribbons import ribbon
 from .shorten import Page, shortened
 from .slivers import steadied
 from .starts import NOTHING, Starts, best_search
-from .tighten import led_back, settled, way_down
+from .tighten import led_back, room_spent, settled, way_down
 
 if TYPE_CHECKING:
     from ..config import FinishConfig
@@ -264,6 +264,8 @@ def brought_back(levels: tuple[Surface, Surface, Surface], ways: list[Way], star
     else:
         straight = [straightened(way, config.bands_carried) for way in found] if coarse is not middle else found
         found = settled(straight, charts, config, late)
+        if config.stretch and coarse is not middle:
+            found = room_spent(found, ways[-1], coarse, charts, late)
     found.mend()
     found.join_crumbs(late)
     pieces = list(found.pieces.values())

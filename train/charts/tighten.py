@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from ...runtime.process.deadline import Late, never
 from ..carry.arcs import with_straight_arcs
 from ..carry.carry import carried_back
@@ -12,6 +14,7 @@ from ..carry.network import network_carried
 from ..carry.straighten import straightened
 from ..seams.closing import Bounds, Closing
 from ..seams.growing import as_one_chart, grown, opened_to
+from ..seams.network import seam_edges
 from ..workers import parallel_map
 from .objective import rank, search_cost
 
@@ -104,8 +107,30 @@ def tightened(search: Search, charts: int, config: FinishConfig, late: Late = ne
     found = opened_and_closed(found, charts, late)
     ways = [found, *other_ways(found, charts, late)]
     best = held(min(ways, key=lambda way: place_of(way, charts)))
+    if best.energy() * closing.growing.room < loose:
+        best = spent(best, Bounds(charts, loose), best.config, closing.growing.tries_closing, late)
     best.config = replace(best.config, stretch=config.stretch)
     return best
+
+
+def room_spent(found: Search, way: Way, coarse: Surface, charts: int, late: Late) -> Search:
+    """The search on the surface, or a shorter one: where its stretch is well within the bound that was asked for.
+
+    Seams are closed further on the proxy by as much as that leaves, and brought back once more.
+    """
+    bound, stretch = found.config.stretch, found.energy()
+    if late() or not stretch or stretch * found.config.closing.growing.room >= bound:
+        return found
+    proxy, config = held(way.found), found.config
+    loose = proxy.energy() * min(bound / stretch, config.closing.growing.most_room)
+    proxy.config = replace(proxy.config, stretch=loose)
+    proxy = spent(proxy, Bounds(charts, loose), proxy.config, config.closing.growing.tries_closing, late)
+    if np.array_equal(seam_edges(proxy), seam_edges(way.found)):
+        return found
+    proxy.config = replace(proxy.config, stretch=bound)
+    led = back_on(found.surface, coarse, proxy, charts, config)
+    other = settled([straightened(each, config.bands_carried) for each in led], charts, config, late)
+    return min((found, other), key=lambda search: place_of(search, charts))
 
 
 def opened_and_closed(search: Search, charts: int, late: Late) -> Search:
@@ -140,8 +165,8 @@ def grown_ways(search: Search, charts: int, late: Late = never) -> list[Search]:
     bare, growing, stretch = held(search), search.config.closing.growing, search.config.stretch
     cuts = grown(search.surface, tuple(share * stretch for share in growing.energies), bare.config)
     begun = [way for way in parallel_map(lambda cut: as_one_chart(bare, cut), cuts) if way is not None]
-    ways = [way for way in begun if way.energy() <= growing.hopeful * stretch]
-    found = parallel_map(lambda way: slit_and_closed(way, charts, late), ways)
+    begun = sorted((way for way in begun if way.energy() <= growing.hopeful * stretch), key=lambda way: way.energy())
+    found = parallel_map(lambda way: slit_and_closed(way, charts, late), begun[: growing.most_ways])
     return [way for way in found if way.energy() <= stretch]
 
 

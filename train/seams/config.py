@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 class GrowingConfig:
     """How seams are grown.  Lengths are shares of √(surface area)."""
 
-    energies: tuple[float, ...] = (0.8, 1.6, 2.4)
+    energies: tuple[float, ...] = (0.8, 1.2, 1.6, 2.0, 2.4, 3.2)
     """Energies foretold at which seams are tried as a start, as multiples of the stretch asked for."""
     looks: int = 6
     """Slits looked at to where a conformal map would squeeze most …"""
@@ -25,8 +25,14 @@ class GrowingConfig:
     """Energy foretold that a slit saves per length at the least."""
     hopeful: float = 1.4
     """Multiple of the stretch asked for above which a chart of seams grown is not gone on with."""
+    most_ways: int = 4
+    """Charts of seams grown that are gone on with at most, those of least stretch."""
     proxy: float = 1.15
     """Multiple of the stretch asked for that a proxy may have."""
+    room: float = 1.3
+    """How many times less than it may be stretch has to be for more closing: with scaffolds, or on the proxy anew …"""
+    most_room: float = 2.0
+    """… up to so many times its stretch."""
     tries_closing: int = 16
     """Runs flattened at each price as they are closed."""
     tips: int = 4

@@ -15,8 +15,11 @@ from flexpara.runtime.process.deadline import never
 from flexpara.runtime.samples import make_sample
 from flexpara.train.charts import tighten
 from flexpara.train.charts.objective import search_cost, wasted
-from flexpara.train.charts.tighten import back_on, closed
+from flexpara.train.charts.tighten import Way, back_on, closed, held, opened_by_need, room_spent
 from flexpara.train.config import FinishConfig, PageConfig
+from flexpara.train.seams.closing import path_length
+from flexpara.train.seams.growing import as_one_chart, grown
+from flexpara.train.seams.network import seam_edges
 from flexpara.train.search.labels import dual_graph
 from flexpara.train.search.search import Search
 
@@ -82,6 +85,38 @@ def striped(charts: int, page: PageConfig) -> Search:
     search = Search(surface, dual_graph(surface, edge_table(surface.faces), config.labels.seams), config)
     search.add_all_valid([(np.flatnonzero(label == value), ()) for value in range(charts)])
     return search
+
+
+def seam_length(search: Search) -> float:
+    return path_length(search, np.flatnonzero(seam_edges(search)))
+
+
+def sphere_in_one_chart(resolution: int, excess: float) -> Search:
+    """A sphere of area 1, slit until its stretch is within this bound."""
+    whole = Surface(*make_sample("sphere", resolution=resolution))
+    surface = Surface(whole.vertices / np.sqrt(whole.face_areas().sum()), whole.faces)
+    config = FinishConfig(stretch=excess)
+    bare = Search(surface, dual_graph(surface, edge_table(surface.faces), config.labels.seams), config)
+    (found,) = [way for cut in grown(surface, (excess,), held(bare).config) if (way := as_one_chart(held(bare), cut))]
+    opened_by_need(found, excess, never)
+    return found
+
+
+def test_stretch_that_is_far_from_its_bound_is_spent_on_shorter_seams() -> None:
+    found = sphere_in_one_chart(20, 0.01)
+    assert found.energy() <= 0.01
+    found.config = replace(found.config, stretch=0.04)
+    spent = room_spent(found, Way(found, found), found.surface, 1, never)
+    assert seam_length(spent) < seam_length(found)
+    assert found.energy() < spent.energy() <= 0.04
+
+
+def test_stretch_near_its_bound_and_a_late_hour_leave_a_search_as_it_is() -> None:
+    found = sphere_in_one_chart(12, 0.02)
+    found.config = replace(found.config, stretch=1.2 * found.energy())
+    assert room_spent(found, Way(found, found), found.surface, 1, never) is found
+    found.config = replace(found.config, stretch=0.1)
+    assert room_spent(found, Way(found, found), found.surface, 1, lambda: True) is found
 
 
 @pytest.mark.parametrize("page", [0.0, 0.01])
