@@ -80,7 +80,7 @@ class SeparationConfig:
     """… that have at least this share of the area of all …"""
     few: int = 2
     """… and the others."""
-    work: float = 3e8
+    work: float = 1.5e8
     """Cells of tables that are read in all; a table that is made counts five times."""
     slower: float = 0.1
     """Share of that which is done where nothing was compiled."""

@@ -142,10 +142,7 @@ class HasteConfig:
 class ArcConfig:
     """Seams between two junctions, made straight along the edges of the surface."""
 
-    passes: tuple[tuple[float, int], ...] = (
-        *((1.5, 8), (1.5, 8), (2.0, 16)),
-        *((3.0, 60), (1.5, 8), (2.0, 16)),
-    )
+    passes: tuple[tuple[float, int], ...] = ((1.5, 8), (1.5, 8), (2.0, 16), (3.0, 60))
     """Of each pass: how far from its place an arc may go, in edges of its own mean length, and its most edges."""
     turning: float = 0.3
     """Price of a turn by a right angle, as a share of what the two edges beside it cost on average."""
