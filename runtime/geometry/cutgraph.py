@@ -80,10 +80,15 @@ def place_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDAr
     return prices.places.at(surface.vertices[table.edges].mean(axis=1))
 
 
-def counted_length(segments: NDArray[np.float64], prices: SeamPrices) -> float:
-    """Length of seams along segments (n, 2, 3) as the objective counts it: times what they cost for where they lie."""
+def counted_lengths(segments: NDArray[np.float64], prices: SeamPrices) -> NDArray[np.float64]:
+    """(n,) lengths of segments (n, 2, 3) as the objective counts seams: times what they cost for where they lie."""
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    return float((length if prices.places is None else length * prices.places.at(segments.mean(axis=1))).sum())
+    return length if prices.places is None else length * prices.places.at(segments.mean(axis=1))
+
+
+def counted_length(segments: NDArray[np.float64], prices: SeamPrices) -> float:
+    """The sum of `counted_lengths`."""
+    return float(counted_lengths(segments, prices).sum())
 
 
 def counted_prices(surface: Surface, table: EdgeTable, prices: SeamPrices) -> NDArray[np.float64]:

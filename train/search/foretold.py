@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...runtime.geometry.cutgraph import counted_lengths
 from ...runtime.geometry.topology import face_components
 from ..finish.curvature import Curvature, foretold_energies
 
@@ -56,8 +57,5 @@ class Foretold:
         used, index = np.unique(ends, return_inverse=True)
         index = index.reshape(-1, 2)
         run = face_components(len(used), index)[index[:, 0]]
-        points = self.surface.vertices[ends]
-        length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-        if self.config.slit.seams.places is not None:
-            length = length * self.config.slit.seams.places.at(points.mean(axis=1))
+        length = counted_lengths(self.surface.vertices[ends], self.config.slit.seams)
         return float(np.bincount(run, length).max(initial=0.0)) / self.unit
